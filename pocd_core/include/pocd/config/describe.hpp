@@ -1,0 +1,34 @@
+// One description of every parameter, used to load, check, dump and document it.
+//
+// A stage's Config struct gives its fields once, with default, unit, range and meaning:
+//
+//   struct TsdfConfig {
+//     double voxel_size_m = 0.05;
+//     template <class Visitor>
+//     void describe(Visitor& visit) {
+//       visit("voxel_size_m", voxel_size_m, Range{0.002, 1.0}, "Edge of a voxel [m].");
+//     }
+//   };
+//
+// A Visitor has operator() for: double, int, std::uint64_t with a Range; bool; std::string;
+// std::string with Choices; std::vector of structs or strings; and group(name, nested, doc) for a
+// nested struct. Visitors live in src/config (strict YAML load, dump, Markdown page).
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace pocd {
+
+/// Closed interval of allowed values.
+struct Range {
+  double low;
+  double high;
+};
+
+/// Allowed words of a string parameter.
+struct Choices {
+  std::vector<std::string> words;
+};
+
+}  // namespace pocd

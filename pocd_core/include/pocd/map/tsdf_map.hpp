@@ -1,0 +1,90 @@
+// The map: a hash of voxel blocks with TSDF, weight and owning object per voxel.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "pocd/common/thread_pool.hpp"
+#include "pocd/common/types.hpp"
+#include "pocd/config/describe.hpp"
+#include "pocd/input/depth_noise.hpp"
+#include "pocd/input/frame.hpp"
+#include "pocd/map/voxel_block.hpp"
+
+namespace pocd {
+
+struct TsdfConfig {
+  double voxel_size_m = 0.05;
+  double truncation_voxels = 4.0;
+  double max_depth_m = 3.0;
+  int max_weight = 100;
+
+  double truncation_m() const { return truncation_voxels * voxel_size_m; }
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("voxel_size_m", voxel_size_m, Range{0.002, 1.0}, "Edge of a voxel [m].");
+    visit("truncation_voxels", truncation_voxels, Range{2.0, 16.0},
+          "Truncation distance of the signed distance [voxels].");
+    visit("max_depth_m", max_depth_m, Range{0.1, 100.0},
+          "Depth beyond which a pixel is not used, theta_depth [m].");
+    visit("max_weight", max_weight, Range{1, 1000},
+          "Cap of a voxel's weight [observations]: smaller reacts faster, larger averages longer.");
+  }
+};
+
+/// What integrate_frame needs beside the frame.
+struct IntegrationInput {
+  const Frame* frame = nullptr;
+  /// Row-major, one entry per pixel of the frame downscaled by `owner_stride`: the ObjectId index
+  /// that owns the surface seen there, 0 background, kSkip = do not integrate this pixel.
+  const std::uint32_t* owners = nullptr;
+  int owner_width = 0;
+  int owner_height = 0;
+  int owner_stride = 1;
+  static constexpr std::uint32_t kSkip = 0xFFFFFFFFu;
+};
+
+/// Not thread-safe: one writer, no reader beside it.
+class TsdfMap {
+ public:
+  explicit TsdfMap(const TsdfConfig& config);
+  ~TsdfMap();
+  TsdfMap(TsdfMap&&) noexcept;
+  TsdfMap& operator=(TsdfMap&&) noexcept;
+
+  const TsdfConfig& config() const;
+
+  /// Fuses one depth image (projective TSDF): allocates the blocks within the truncation band of the
+  /// observed surface, averages the signed distance in every allocated block in view, and carves
+  /// known free space in front of the surface (a voxel that the ray passes through loses its surface
+  /// within a few frames even at full weight). A voxel within the band takes the pixel's owner; a
+  /// block left with free space only is dropped. Bit-identical for every thread count.
+  void integrate(const IntegrationInput& input, ThreadPool& pool);
+
+  /// Resets exactly the voxels owned by `id` to unknown (weight 0, owner 0), drops blocks that end
+  /// empty, returns how many voxels were reset. Cost grows with the object, not with the map.
+  std::size_t clear_object(ObjectId id);
+
+  /// Voxels of `from` become voxels of `to` (two library entries found to be one thing).
+  std::size_t reassign_object(ObjectId from, ObjectId to);
+
+  std::size_t block_count() const;
+  /// Null where nothing is allocated. Valid until the next change of the map.
+  const VoxelBlock* find(const BlockKey& key) const;
+  /// For tests and loading: the block at key, allocated when missing; marked dirty.
+  VoxelBlock& touch(const BlockKey& key);
+  /// Keys of all blocks in canonical order (BlockKey::operator<).
+  std::vector<BlockKey> sorted_keys() const;
+
+  /// Keys of blocks changed (or dropped) since the last call, canonical order; clears the list.
+  std::vector<BlockKey> take_dirty();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pocd

@@ -1,0 +1,72 @@
+// What one frame changed: the whole output of the core, for publishers, files and tests.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pocd/common/types.hpp"
+#include "pocd/state/object_state.hpp"
+
+namespace pocd {
+
+/// A library object as others see it.
+struct ObjectSnapshot {
+  ObjectId id = ObjectId::kNone;
+  ClassId class_id = 0;
+  int stationarity_class = 0;  ///< s: 0 movable, 1 static
+  OrientedBox box;             ///< map frame
+  Belief belief;
+  StampNs first_seen_ns = 0;
+  StampNs last_seen_ns = 0;
+  std::uint32_t observations = 0;
+  std::string last_robot;  ///< namespace of the robot that saw it last
+};
+
+enum class EventKind { kAdded, kUpdated, kMoved, kRemoved };
+const char* to_string(EventKind kind);  ///< "ADDED", "UPDATED", "MOVED", "REMOVED"
+
+/// Why an event happened: enough to recompute the belief step that made it.
+struct Evidence {
+  double delta_m = 0.0;        ///< measured geometric change
+  int stationarity_class = 0;  ///< s of the measurement
+  double k = 0.0;              ///< weight of the semantic likelihood
+  double c1 = 0.0;             ///< inlier probability of the measurement
+  double c2 = 0.0;             ///< outlier probability, c1 + c2 = 1
+  double visible_share = 0.0;  ///< of the object's points that this frame had evidence about
+  double seen_through_share = 0.0;  ///< of those, the share the camera saw through
+  double measurement_sigma_m = 0.0;
+  Belief before, after;
+  std::string rule;  ///< name of the lifecycle rule that fired, e.g. "stationarity_below_threshold"
+};
+
+struct ObjectEvent {
+  std::uint64_t sequence = 0;  ///< 1, 2, ... within a run
+  EventKind kind = EventKind::kAdded;
+  ObjectId object = ObjectId::kNone;
+  ClassId class_id = 0;
+  StampNs stamp_ns = 0;            ///< of the frame that caused it
+  std::uint64_t frame_sequence = 0;
+  std::string robot;
+  OrientedBox box;                  ///< now (for REMOVED: the last one)
+  std::optional<OrientedBox> previous_box;  ///< MOVED: where it was
+  Evidence evidence;
+};
+
+/// A stage and the time it took. Measured by the caller's clock, never used in a decision.
+struct StageTiming {
+  const char* stage = "";
+  double wall_ms = 0.0;
+};
+
+struct FrameResult {
+  bool accepted = true;             ///< false: the frame was refused as a whole, see warnings
+  std::vector<ObjectEvent> events;
+  /// Library entries that are new or changed, by id. Removed ones appear in `events` only.
+  std::vector<ObjectSnapshot> changed_objects;
+  std::vector<StageTiming> timings;
+  /// One line each, e.g. "pose jump of 0.31 m: frame not used for object states".
+  std::vector<std::string> warnings;
+};
+
+}  // namespace pocd

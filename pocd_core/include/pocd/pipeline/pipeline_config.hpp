@@ -1,0 +1,42 @@
+// Every parameter of the core, by stage. Defaults are those of the warehouse (TorWIC) setting.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pocd/association/association_config.hpp"
+#include "pocd/change/change_config.hpp"
+#include "pocd/config/describe.hpp"
+#include "pocd/input/depth_noise.hpp"
+#include "pocd/map/tsdf_map.hpp"
+#include "pocd/segmentation/class_map.hpp"
+#include "pocd/segmentation/segmentation_config.hpp"
+#include "pocd/state/state_config.hpp"
+
+namespace pocd {
+
+struct PipelineConfig {
+  int threads = 1;
+  DepthNoise depth_noise;
+  ClassMap classes;
+  SegmentationConfig segmentation;
+  AssociationConfig association;
+  ChangeConfig change;
+  StateConfig state;
+  TsdfConfig map;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("threads", threads, Range{1, 64}, "Threads of the pipeline; results do not depend on it.");
+    visit.group("depth_noise", depth_noise, "Noise of the depth camera.");
+    visit.group("classes", classes, "Meaning of the segmentation's class indices.");
+    visit.group("segmentation", segmentation, "From image to observations.");
+    visit.group("association", association, "Which observation is which object.");
+    visit.group("change", change, "Measuring geometric change.");
+    visit.group("state", state, "Belief and life cycle of objects.");
+    visit.group("map", map, "The TSDF map.");
+  }
+};
+
+}  // namespace pocd

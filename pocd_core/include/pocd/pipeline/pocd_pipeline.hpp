@@ -1,0 +1,35 @@
+// POCD: frame in, changes out. The story of a frame is PocdPipeline::process_frame.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pocd/input/frame.hpp"
+#include "pocd/map/tsdf_map.hpp"
+#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/pipeline/pipeline_config.hpp"
+
+namespace pocd {
+
+/// Owns the object library and the map. Not thread-safe; it uses `config.threads` threads inside and
+/// gives the same bits for every number of them.
+class PocdPipeline {
+ public:
+  explicit PocdPipeline(const PipelineConfig& config);
+  ~PocdPipeline();
+
+  /// Frames of one or several robots, in the order they are to be fused. Throws InputError for a frame
+  /// that make_frame would not have made; anything merely implausible is a warning in the result.
+  FrameResult process_frame(const Frame& frame);
+
+  /// Confirmed objects by id.
+  std::vector<ObjectSnapshot> objects() const;
+  TsdfMap& map();
+  const TsdfMap& map() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pocd

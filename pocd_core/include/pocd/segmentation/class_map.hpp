@@ -1,0 +1,61 @@
+// What a class index of the segmentation means. The label map is configuration, never code: data sets
+// order the same classes differently.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pocd/common/types.hpp"
+#include "pocd/config/describe.hpp"
+
+namespace pocd {
+
+/// background: mapped, never an object (walls, shelving bolted down, ceiling).
+/// ground: mapped, removed before clustering. object: tracked with a belief.
+/// dynamic: moves by itself (people, trucks): neither mapped nor tracked. ignore: pixels not used at
+/// all (the robot's own body).
+enum class ClassRole { kBackground, kGround, kObject, kDynamic, kIgnore };
+
+struct ClassInfo {
+  int id = 0;
+  std::string name;
+  std::string role = "background";
+  int stationarity_class = 1;  ///< s: 0 dynamic/movable, 1 static
+  std::string rgb = "";        ///< colour of the class in rgb8 masks, "r,g,b"; empty: none
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("id", id, Range{0, 65535}, "Class index in mono8 and mono16 segmentation images.");
+    visit("name", name, "Name in outputs.");
+    visit("role", role, Choices{{"background", "ground", "object", "dynamic", "ignore"}},
+          "What the pipeline does with its pixels.");
+    visit("stationarity_class", stationarity_class, Range{0, 1}, "s: 0 movable, 1 static.");
+    visit("rgb", rgb, "Colour in rgb8/bgr8 segmentation images as \"r,g,b\"; empty for none.");
+  }
+};
+
+struct ClassMap {
+  /// Class of every pixel of a frame that has no segmentation image.
+  int default_class = 0;
+  /// Pixel value = class * label_divisor + instance; 1: the value is the class.
+  int label_divisor = 1;
+  std::vector<ClassInfo> list;
+
+  /// Role of a class; classes not listed are background.
+  ClassRole role(ClassId id) const;
+  int stationarity_class(ClassId id) const;
+  std::string name(ClassId id) const;  ///< "class_<id>" when not listed
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("default_class", default_class, Range{0, 65535},
+          "Class of all pixels when no segmentation image is there.");
+    visit("label_divisor", label_divisor, Range{1, 65535},
+          "Pixel value = class * label_divisor + instance (panoptic masks); 1 = the value is the class.");
+    visit("list", list, "The classes; those not listed are background.");
+  }
+};
+
+}  // namespace pocd

@@ -1,0 +1,46 @@
+// Parameters of an object's belief and life cycle.
+#pragma once
+
+#include "pocd/config/describe.hpp"
+
+namespace pocd {
+
+struct StateConfig {
+  double initial_stationarity = 0.67;
+  double initial_count = 3.0;
+  double initial_sigma_m = 0.5;
+  double max_stationarity = 0.9999;
+  double max_count = 12.0;
+  double remove_below = 0.4;
+  double k = 3.0;
+  int confirm_observations = 3;
+  int tentative_frames = 15;
+  int erode_frames = 6;
+  double relocation_window_s = 60.0;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("initial_stationarity", initial_stationarity, Range{0.01, 0.99}, "E[v] of a new object.");
+    visit("initial_count", initial_count, Range{0.1, 1000.0}, "alpha + beta of a new object.");
+    visit("initial_sigma_m", initial_sigma_m, Range{0.001, 100.0}, "sigma of a new object [m].");
+    visit("max_stationarity", max_stationarity, Range{0.5, 1.0},
+          "An update that would raise E[v] above this is not applied, v_max.");
+    visit("max_count", max_count, Range{1.0, 1e6},
+          "Cap of alpha + beta: how much past evidence an object can hold against new evidence.");
+    visit("remove_below", remove_below, Range{0.0, 1.0},
+          "Objects with E[v] below this are removed from library and map, theta_stat.");
+    visit("k", k, Range{0.0, 100.0},
+          "Weight of the stationarity class where it supports the measurement: movable objects that "
+          "changed, static ones that did not.");
+    visit("confirm_observations", confirm_observations, Range{1, 1000},
+          "Observations before a new object is reported as ADDED.");
+    visit("tentative_frames", tentative_frames, Range{1, 100000},
+          "A new object that is in view this many frames without being confirmed is forgotten [frames].");
+    visit("erode_frames", erode_frames, Range{1, 1000},
+          "A point of an object that is seen through in this many frames in a row is dropped [frames].");
+    visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
+          "A removed object and a new one of like class and size within this time are one MOVED [s].");
+  }
+};
+
+}  // namespace pocd
