@@ -20,12 +20,14 @@ std::string markdown(const ShowTo& show);
 
 }  // namespace config_detail
 
-/// Reads YAML files in order over the values that `config` has; a later file overrides an earlier one
-/// key by key, and a list replaces the whole earlier list. Then `overrides`, each "group.key=value".
+/// Reads YAML files in order over the values that `config` has; a later file overrides an earlier
+/// one key by key, and a list replaces the whole earlier list. Then `overrides`, each
+/// "group.key=value".
 ///
 /// Throws one InputError that lists everything wrong, one line each with file and line: unknown
-/// keys (with the likely intended one), duplicate keys, wrong types, values out of range or not among
-/// the choices, broken rules between parameters, unreadable files. `config` is then unspecified.
+/// keys (with the likely intended one), duplicate keys, wrong types, values out of range or not
+/// among the choices, broken rules between parameters, unreadable files. `config` is then
+/// unspecified.
 template <class T>
 void load_config(T& config, const std::vector<std::filesystem::path>& files,
                  const std::vector<std::string>& overrides = {}) {

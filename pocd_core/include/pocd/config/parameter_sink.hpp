@@ -1,5 +1,5 @@
-// The bridge between describe() templates and code that is compiled once: every visitor of parameters
-// is a ParameterSink, and DescribeAdapter is the Visitor that calls it.
+// The bridge between describe() templates and code that is compiled once: every visitor of
+// parameters is a ParameterSink, and DescribeAdapter is the Visitor that calls it.
 #pragma once
 
 #include <cstddef>
@@ -27,8 +27,8 @@ class ItemList {
   virtual void describe_default(ParameterSink& sink) = 0;
 };
 
-/// Receives every parameter in the order of describe(). Values are references into the struct, to be
-/// read or written. Names are those of one group; begin_group/end_group nest.
+/// Receives every parameter in the order of describe(). Values are references into the struct, to
+/// be read or written. Names are those of one group; begin_group/end_group nest.
 class ParameterSink {
  public:
   virtual ~ParameterSink() = default;
