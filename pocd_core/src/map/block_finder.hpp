@@ -1,0 +1,53 @@
+// Which blocks a frame can change: those the truncation band passes through, and allocated ones in
+// front of the surface.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "block_store.hpp"
+#include "pocd/common/thread_pool.hpp"
+#include "pocd/map/tsdf_map.hpp"
+#include "tsdf_kernel.hpp"
+
+namespace pocd {
+
+/// Keeps its buffers from frame to frame. The grid of block-sized cells spans the bounding box of
+/// the viewing pyramid up to the depth limit.
+class BlockFinder {
+ public:
+  /// Marks the cells that the band of a regular sample of pixels passes through and notes the
+  /// farthest depth of every image tile. Throws InputError when the pyramid has too many blocks.
+  void scan(const TsdfConfig& config, const IntegrationInput& input, ThreadPool& pool);
+
+  /// Keys of the marked cells, canonical order.
+  const std::vector<BlockKey>& band();
+
+  /// Allocated blocks not yet visited with `stamp` that reach into the space that the frame saw to
+  /// be free; visits them.
+  void append_in_free_space(BlockStore& store, std::uint64_t stamp,
+                            std::vector<std::uint32_t>& slots) const;
+
+ private:
+  static constexpr int kTile_px = 16;
+
+  void place_grid();
+  void scan_tile_row(int tile_row);
+  /// Farthest sampled depth over the image area of a sphere, 0 when it is out of view.
+  float farthest_depth(const Eigen::Vector3d& center_C, double radius) const;
+
+  const IntegrationInput* input_ = nullptr;
+  TsdfConfig config_;
+  double block_m_ = 0.0;
+  int step_px_ = 4;
+  BlockKey first_;  // key of cell (0, 0, 0)
+  int size_x_ = 0, size_y_ = 0, size_z_ = 0;
+  std::vector<std::atomic<std::uint8_t>> marks_;
+  int tiles_x_ = 0, tiles_y_ = 0;
+  std::vector<float> tile_far_;
+  std::vector<std::int32_t> cells_;  // scratch of scan_tile_row, one part per row
+  std::vector<BlockKey> band_;
+};
+
+}  // namespace pocd

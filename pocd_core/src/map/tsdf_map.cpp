@@ -1,0 +1,111 @@
+#include "pocd/map/tsdf_map.hpp"
+
+#include <string>
+
+#include "block_store.hpp"
+#include "pocd/common/check.hpp"
+#include "tsdf_integrator.hpp"
+#include "tsdf_kernel.hpp"
+
+namespace pocd {
+
+struct TsdfMap::Impl {
+  explicit Impl(const TsdfConfig& c) : config(c) {}
+
+  // Blocks handed out by touch() may have got any owners since.
+  void settle_touched() {
+    for (const BlockKey& key : touched) {
+      const std::uint32_t slot = store.find(key);
+      if (slot != BlockStore::kNoSlot) store.note_owners(slot);
+    }
+    touched.clear();
+  }
+
+  TsdfConfig config;
+  BlockStore store;
+  TsdfIntegrator integrator;
+  std::vector<BlockKey> touched;
+};
+
+TsdfMap::TsdfMap(const TsdfConfig& config) {
+  if (!(config.voxel_size_m > 0.0 && config.truncation_voxels >= 1.0 && config.max_depth_m > 0.0 &&
+        config.max_weight >= 1 && config.max_weight <= 1000)) {
+    throw InputError(
+        "map: voxel_size_m, truncation_voxels, max_depth_m or max_weight out of range");
+  }
+  impl_ = std::make_unique<Impl>(config);
+}
+TsdfMap::~TsdfMap() = default;
+TsdfMap::TsdfMap(TsdfMap&&) noexcept = default;
+TsdfMap& TsdfMap::operator=(TsdfMap&&) noexcept = default;
+
+const TsdfConfig& TsdfMap::config() const { return impl_->config; }
+
+void TsdfMap::integrate(const IntegrationInput& input, ThreadPool& pool) {
+  impl_->settle_touched();
+  impl_->integrator.integrate(impl_->config, input, impl_->store, pool);
+}
+
+std::size_t TsdfMap::clear_object(ObjectId id) {
+  impl_->settle_touched();
+  const std::uint32_t owner = to_index(id);
+  std::size_t cleared = 0;
+  for (const std::uint32_t slot : impl_->store.take_owner(owner)) {
+    VoxelBlock& block = impl_->store.block(slot);
+    std::size_t here = 0;
+    bool surface = false;
+    for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
+      if (block.owner[i] == owner) {
+        block.tsdf[i] = 0;
+        block.weight[i] = 0;
+        block.owner[i] = 0;
+        ++here;
+      }
+      surface |= block.weight[i] > 0 && block.tsdf[i] < kFreeTsdf;
+    }
+    if (here == 0) continue;
+    cleared += here;
+    impl_->store.mark_dirty(slot);
+    if (!surface) impl_->store.drop(slot);
+  }
+  return cleared;
+}
+
+std::size_t TsdfMap::reassign_object(ObjectId from, ObjectId to) {
+  if (from == to) return 0;
+  impl_->settle_touched();
+  std::size_t changed = 0;
+  for (const std::uint32_t slot : impl_->store.take_owner(to_index(from))) {
+    std::size_t here = 0;
+    for (std::uint32_t& owner : impl_->store.block(slot).owner) {
+      if (owner != to_index(from)) continue;
+      owner = to_index(to);
+      ++here;
+    }
+    if (here == 0) continue;
+    changed += here;
+    impl_->store.note_owner(slot, to_index(to));
+    impl_->store.mark_dirty(slot);
+  }
+  return changed;
+}
+
+std::size_t TsdfMap::block_count() const { return impl_->store.size(); }
+
+const VoxelBlock* TsdfMap::find(const BlockKey& key) const {
+  const std::uint32_t slot = impl_->store.find(key);
+  return slot == BlockStore::kNoSlot ? nullptr : &impl_->store.block(slot);
+}
+
+VoxelBlock& TsdfMap::touch(const BlockKey& key) {
+  const std::uint32_t slot = impl_->store.find_or_allocate(key);
+  impl_->store.mark_dirty(slot);
+  impl_->touched.push_back(key);
+  return impl_->store.block(slot);
+}
+
+std::vector<BlockKey> TsdfMap::sorted_keys() const { return impl_->store.sorted_keys(); }
+
+std::vector<BlockKey> TsdfMap::take_dirty() { return impl_->store.take_dirty(); }
+
+}  // namespace pocd
