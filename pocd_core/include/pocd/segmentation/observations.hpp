@@ -1,0 +1,54 @@
+// Step 3 of the method: clusters of the cleaned cloud, and the observations made of them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "pocd/segmentation/planes.hpp"
+
+namespace pocd {
+
+/// A point of a surface. normal_W is a unit vector towards the side it was seen from, or zero where the
+/// surface was not planar. sigma_m: depth noise at the point.
+struct SurfacePoint {
+  Eigen::Vector3f point_W;
+  Eigen::Vector3f normal_W;
+  float sigma_m = 0.0f;
+};
+
+/// One cluster of one frame, thinned to about one point per `spacing`.
+struct Observation {
+  ClassId class_id = 0;
+  OrientedBox box;
+  std::vector<SurfacePoint> points;
+  int pixels = 0;       ///< of the strided grid
+  double area_m2 = 0.0; ///< of the surface seen face on
+};
+
+struct Observations {
+  std::vector<Observation> list;
+  /// Per grid pixel: index in `list` or kNone.
+  std::vector<std::int32_t> observation_of;
+  static constexpr std::int32_t kNone = -1;
+};
+
+/// Connected components of kObject pixels of one class and instance (organised Euclidean clustering:
+/// image neighbours, also across a gap of one pixel, nearer than the tolerance), small ones dropped,
+/// overlapping ones of one class merged, one class by majority, each with box and thinned points.
+/// Pixels of the ground band right under an observation and of its class are given to it.
+void extract_observations(const SegmentationConfig& config, const DepthNoise& noise,
+                          double spacing_m, const PlaneSegmentation& planes, OrganizedCloud& cloud,
+                          Observations& out);
+
+/// Upright box around points: heading of the rectangle of least area around the points flattened to
+/// the ground, the outermost `trim` share of points per axis left out. Sizes of degenerate sets are 0.
+/// At least one point.
+OrientedBox fit_box(const Points& points_W, double trim);
+
+/// The published box: heading of the major axis by principal component analysis.
+OrientedBox fit_box_pca(const Points& points_W);
+
+/// Volume of the intersection over the smaller volume, with every size at least `min_size_m`.
+double box_overlap(const OrientedBox& a, const OrientedBox& b, double min_size_m);
+
+}  // namespace pocd
