@@ -1,0 +1,44 @@
+// The recent poses of one moving frame, looked up by stamp.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+
+#include "pocd/common/types.hpp"
+#include "pocd/input/pose_quaternion.hpp"
+
+namespace pocd {
+
+/// kTooNew: the stamp lies after the newest pose; a later one may still arrive. kTooOld: before the
+/// oldest one kept. kGap: between two poses that are further apart than `max_gap_ns`.
+enum class PoseLookup { kFound, kTooNew, kTooOld, kGap, kEmpty };
+const char* to_string(PoseLookup result);
+
+/// Not thread-safe.
+class PoseBuffer {
+ public:
+  /// Both bounds in nanoseconds, > 0; capacity in poses, > 1.
+  PoseBuffer(StampNs max_gap_ns, std::size_t capacity);
+
+  /// False, and nothing stored, when `stamp_ns` is older than the newest pose (a stamp that jumped
+  /// backwards). A pose with the newest one's stamp replaces it.
+  bool add(StampNs stamp_ns, const PoseQuaternion& pose);
+
+  /// The pose at exactly that stamp (bit by bit, where one was stored) or between its neighbours.
+  /// Up to `extrapolation_ns` after the newest pose, that newest pose is held.
+  PoseLookup at(StampNs stamp_ns, StampNs extrapolation_ns, PoseQuaternion& pose) const;
+
+  bool empty() const { return entries_.empty(); }
+  StampNs newest_ns() const { return entries_.back().stamp_ns; }
+
+ private:
+  struct Entry {
+    StampNs stamp_ns;
+    PoseQuaternion pose;
+  };
+  StampNs max_gap_ns_;
+  std::size_t capacity_;
+  std::deque<Entry> entries_;
+};
+
+}  // namespace pocd

@@ -1,0 +1,111 @@
+// Brings the streams of one robot's camera together by stamp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <map>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pocd/common/types.hpp"
+#include "pocd/input/camera_model.hpp"
+#include "pocd/input/transform_tree.hpp"
+
+namespace pocd {
+
+/// kAbsent: not looked at. kOptional: waited for, then gone on without. kRequired: waited for, then the
+/// frame is dropped.
+enum class StreamUse { kAbsent, kOptional, kRequired };
+
+struct SynchronizerConfig {
+  StreamUse segmentation = StreamUse::kOptional;
+  StreamUse color = StreamUse::kAbsent;
+  /// How far newer data of the robot may run ahead of a frame before what the frame lacks counts as
+  /// missing [ns of data time].
+  StampNs max_wait_ns = 300'000'000;
+  /// Largest difference of stamps that belong together [ns].
+  StampNs tolerance_ns = 1'000'000;
+  /// How long the newest pose may be held when no later one comes [ns]; 0: never.
+  StampNs extrapolation_ns = 0;
+  std::size_t capacity = 64;  ///< images kept per stream; the oldest goes first
+  std::string map_frame = "map";
+  std::string camera_frame = "camera_color_optical_frame";
+};
+
+/// One depth image with what belongs to it; images as they came (see make_frame).
+struct SyncedFrame {
+  StampNs stamp_ns = 0;
+  CameraModel camera;
+  Pose T_W_C = Pose::Identity();
+  cv::Mat depth;
+  cv::Mat labels;  ///< empty: went on without
+  cv::Mat color;
+};
+
+/// What happened to the frames of one robot.
+struct SynchronizerCounts {
+  std::uint64_t complete = 0;
+  std::uint64_t without_segmentation = 0;  ///< emitted, although segmentation was waited for
+  std::uint64_t without_color = 0;
+  std::uint64_t dropped_no_segmentation = 0;
+  std::uint64_t dropped_no_color = 0;
+  std::uint64_t dropped_no_camera_info = 0;
+  std::uint64_t dropped_no_pose = 0;
+  std::uint64_t dropped_overflow = 0;
+  std::uint64_t unmatched_images = 0;  ///< segmentation or colour without a depth image
+};
+
+/// Streams of one robot. Time is data time only: nothing here reads a clock. Frames come out in the
+/// order of their stamps; the oldest one holds up the others until it is complete or its wait is over.
+/// Not thread-safe.
+class TimeSynchronizer {
+ public:
+  /// `transforms` must outlive the synchroniser; it gives T_map_camera.
+  TimeSynchronizer(const SynchronizerConfig& config, const TransformTree& transforms);
+
+  enum class Stream { kDepth, kSegmentation, kColor, kCameraInfo };
+
+  /// False, and nothing stored, when the stamp is not after the stream's newest one.
+  bool add_image(Stream stream, StampNs stamp_ns, cv::Mat image);
+  bool add_camera_info(StampNs stamp_ns, const CameraModel& camera);
+  /// Tells how far the pose stream has come, for the bounded wait.
+  void pose_seen(StampNs stamp_ns);
+
+  /// Unbounded wait for replay without loss: what a frame lacks is waited for, however far other
+  /// streams run ahead.
+  void set_patient(bool patient) { patient_ = patient; }
+
+  /// Frames that are ready, by stamp.
+  std::vector<SyncedFrame> take();
+  /// The same, when nothing more will come: whatever a frame lacks is missing.
+  std::vector<SyncedFrame> flush();
+
+  std::size_t pending() const { return depth_.size(); }
+  /// No frame with this stamp or an earlier one will come out any more.
+  StampNs watermark_ns() const { return watermark_ns_; }
+  /// "" or "waiting for <stream> since <stamp>" about the oldest frame that is not complete.
+  std::string waiting_for() const;
+  const SynchronizerCounts& counts() const { return counts_; }
+
+ private:
+  std::vector<SyncedFrame> run(bool last_call);
+  std::optional<cv::Mat> match(std::deque<std::pair<StampNs, cv::Mat>>& stream, StampNs stamp_ns);
+  bool camera_at(StampNs stamp_ns, bool settle, CameraModel& camera);
+
+  SynchronizerConfig config_;
+  const TransformTree& transforms_;
+  std::deque<std::pair<StampNs, cv::Mat>> depth_, segmentation_, color_;
+  std::deque<std::pair<StampNs, CameraModel>> infos_;
+  std::map<Stream, StampNs> newest_ns_;
+  StampNs horizon_ns_ = std::numeric_limits<StampNs>::min();
+  StampNs watermark_ns_ = std::numeric_limits<StampNs>::min();
+  bool patient_ = false;
+  std::string blocked_by_;
+  SynchronizerCounts counts_;
+};
+
+}  // namespace pocd
