@@ -23,7 +23,6 @@ TransformLookup TransformTree::lookup(const std::string& target, const std::stri
                                       StampNs stamp_ns, StampNs extrapolation_ns) const {
   TransformLookup answer;
   std::string frame = source;
-  bool first = true;
   // A chain longer than the number of edges has a loop.
   for (std::size_t steps = 0; frame != target; ++steps) {
     const auto found = edges_.find(frame);
@@ -42,9 +41,7 @@ TransformLookup TransformTree::lookup(const std::string& target, const std::stri
         return answer;
       }
     }
-    // Multiplied only from the second edge on, so that a chain of two is exactly one product.
-    answer.T_target_source = first ? to_pose(pose) : to_pose(pose) * answer.T_target_source;
-    first = false;
+    answer.T_target_source = to_pose(pose) * answer.T_target_source;
     frame = edge.parent;
   }
   answer.result = PoseLookup::kFound;
