@@ -1,0 +1,128 @@
+#include "pocd/association/icp_target.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pocd/common/check.hpp"
+
+namespace pocd {
+namespace {
+
+// Bounds the memory of level 0 (4 bytes a cell) for very long objects; their cells get larger.
+constexpr double kMaxCells = 1 << 20;
+constexpr int kBorder = 2;
+
+// The 3 x 3 rows of cells around a query, nearest first, so that the later ones are mostly skipped.
+constexpr std::array<std::array<int, 2>, 9> kRows = {
+    {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+
+float square(float x) { return x * x; }
+
+}  // namespace
+
+Eigen::Array3i IcpTarget::Level::cell_of(const Eigen::Vector3f& point) const {
+  // Bounded before the conversion: a query may be anywhere.
+  return (point.array() / cell_m).floor().max(-1e6f).min(1e6f).cast<int>() + kBorder;
+}
+
+IcpTarget::Level IcpTarget::make_level(const std::vector<Eigen::Vector3f>& points,
+                                       const std::vector<Eigen::Vector3f>& normals, float cell_m) {
+  Level level;
+  level.cell_m = cell_m;
+  Eigen::Array3f extent = Eigen::Array3f::Zero();
+  for (const auto& p : points) extent = extent.max(p.array());
+  level.cells = (extent / cell_m).floor().cast<int>() + 1 + 2 * kBorder;
+
+  // Counting sort by cell; within a cell the input's order stays.
+  std::vector<std::uint32_t> cell(points.size());
+  level.begin.assign(level.cells.prod() + 1, 0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    cell[i] = static_cast<std::uint32_t>(level.flat_index(level.cell_of(points[i])));
+    ++level.begin[cell[i] + 1];
+  }
+  for (std::size_t c = 1; c < level.begin.size(); ++c) level.begin[c] += level.begin[c - 1];
+  std::vector<std::uint32_t> next(level.begin.begin(), level.begin.end() - 1);
+  level.points.resize(points.size());
+  level.normals.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::uint32_t slot = next[cell[i]]++;
+    level.points[slot] = points[i];
+    level.normals[slot] = normals[i];
+  }
+  return level;
+}
+
+IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inlier_distance_m,
+                     double max_correspondence_m)
+    : inlier_distance_m_(inlier_distance_m), max_correspondence_m_(max_correspondence_m) {
+  POCD_CHECK(!points_W.empty() && points_W.size() == normals_W.size());
+  POCD_CHECK(inlier_distance_m > 0.0 && max_correspondence_m >= inlier_distance_m);
+  Eigen::Vector3f low = points_W.front(), high = points_W.front();
+  for (const auto& p : points_W) {
+    POCD_CHECK(p.allFinite());
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  origin_W_ = low.cast<double>();
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(points_W.size());
+  for (const auto& p : points_W) points.push_back(p - low);
+
+  double cell_m = inlier_distance_m;
+  const Eigen::Array3d size_m = (high - low).cast<double>().array();
+  while ((size_m / cell_m + 1 + 2 * kBorder).prod() > kMaxCells) cell_m *= 1.25;
+
+  levels_.push_back(make_level(points, normals_W, static_cast<float>(cell_m)));
+  while (levels_.back().cell_m < max_correspondence_m) {
+    const Level& below = levels_.back();
+    std::vector<Eigen::Vector3f> fewer, fewer_normals;
+    for (std::size_t c = 0; c + 1 < below.begin.size(); ++c) {
+      if (below.begin[c] == below.begin[c + 1]) continue;
+      // The middle one of the cell in input order: as good as any, and always the same.
+      const std::uint32_t i = (below.begin[c] + below.begin[c + 1]) / 2;
+      fewer.push_back(below.points[i]);
+      fewer_normals.push_back(below.normals[i]);
+    }
+    levels_.push_back(make_level(fewer, fewer_normals, 2.0f * below.cell_m));
+  }
+}
+
+void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbour& best) {
+  const Eigen::Array3i cell = level.cell_of(query);
+  if ((cell < 1).any() || (cell > level.cells - 2).any()) return;
+  const Eigen::Array3f below = query.array() - (cell - kBorder).cast<float>() * level.cell_m;
+  const Eigen::Array3f above = level.cell_m - below;
+  std::uint32_t found = static_cast<std::uint32_t>(level.points.size());
+  for (const auto& [dy, dz] : kRows) {
+    const float gap_y = dy == 0 ? 0.0f : dy < 0 ? below.y() : above.y();
+    const float gap_z = dz == 0 ? 0.0f : dz < 0 ? below.z() : above.z();
+    if (square(gap_y) + square(gap_z) >= best.squared_distance_m2) continue;
+    const int middle = level.flat_index(cell + Eigen::Array3i(0, dy, dz));
+    const std::uint32_t end = level.begin[middle + 2];
+    for (std::uint32_t i = level.begin[middle - 1]; i < end; ++i) {
+      const float d2 = (level.points[i] - query).squaredNorm();
+      if (d2 < best.squared_distance_m2) best.squared_distance_m2 = d2, found = i;
+    }
+  }
+  if (found == level.points.size()) return;
+  best.point = level.points[found];
+  best.normal = level.normals[found];
+}
+
+std::optional<IcpTarget::Neighbour> IcpTarget::nearest(const Eigen::Vector3f& query) const {
+  Neighbour best;
+  const float limit = square(static_cast<float>(max_correspondence_m_));
+  // Points on the limit itself belong to it.
+  best.squared_distance_m2 = std::nextafter(limit, 2.0f * limit);
+  const float none = best.squared_distance_m2;
+  for (const Level& level : levels_) {
+    search(level, query, best);
+    // Whatever is within one cell has been seen by the search of the 3 x 3 x 3 neighbourhood.
+    if (best.squared_distance_m2 <= square(level.cell_m)) return best;
+  }
+  if (best.squared_distance_m2 == none) return std::nullopt;
+  return best;
+}
+
+}  // namespace pocd
