@@ -42,6 +42,7 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
   app.add_option("--input", options.inputs,
                  "Folder (for sim: scenario YAML file); repeat it to visit several as one run")
       ->required()
+      ->allow_extra_args(false)
       ->group(group);
   app.add_option("--repeat", options.repeat, "Frames made of each still image (pcd)")
       ->check(CLI::Range(1, 10000))

@@ -1,6 +1,7 @@
 #include "pocd/segmentation/class_map.hpp"
 
 #include <algorithm>
+#include <charconv>
 
 #include "pocd/segmentation/organized_cloud.hpp"
 
@@ -21,6 +22,43 @@ ClassRole parse_role(const std::string& role) {
 }
 
 }  // namespace
+
+std::optional<std::array<std::uint8_t, 3>> parse_rgb(const std::string& text) {
+  std::array<std::uint8_t, 3> rgb{};
+  const char* at = text.data();
+  const char* const end = text.data() + text.size();
+  for (std::size_t i = 0; i < rgb.size(); ++i) {
+    if (i > 0 && (at == end || *at++ != ',')) return std::nullopt;
+    while (at != end && *at == ' ') ++at;
+    const auto [next, error] = std::from_chars(at, end, rgb[i]);
+    if (error != std::errc{}) return std::nullopt;
+    at = next;
+  }
+  if (at != end) return std::nullopt;
+  return rgb;
+}
+
+std::vector<std::string> ClassMap::inconsistencies() const {
+  std::vector<std::string> problems;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string entry = "list[" + std::to_string(i) + "]";
+    const auto rgb = parse_rgb(list[i].rgb);
+    if (!list[i].rgb.empty() && !rgb) {
+      problems.push_back(entry + ".rgb: \"" + list[i].rgb +
+                         "\" is no colour \"r,g,b\" of 0 to 255");
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      const std::string earlier = "list[" + std::to_string(j) + "]";
+      if (list[i].id == list[j].id) {
+        problems.push_back(entry + ".id: " + std::to_string(list[i].id) + " is that of " + earlier);
+      }
+      if (rgb && rgb == parse_rgb(list[j].rgb)) {
+        problems.push_back(entry + ".rgb: \"" + list[i].rgb + "\" is that of " + earlier);
+      }
+    }
+  }
+  return problems;
+}
 
 ClassRole ClassMap::role(ClassId id) const {
   const ClassInfo* info = find(list, id);

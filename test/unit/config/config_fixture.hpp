@@ -9,7 +9,7 @@
 
 #include "pocd/config/config_io.hpp"
 #include "pocd/input/depth_noise.hpp"
-#include "pocd/map/tsdf_map.hpp"
+#include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
@@ -42,22 +42,6 @@ struct AllKinds {
     visit("texts", texts, "Some texts.");
     visit("items", items, "Some structs.");
     visit.group("noise", noise, "A group.");
-  }
-};
-
-/// The groups of the pipeline's configuration that the files of test/data/invalid/config use.
-struct SomeGroups {
-  int threads = 1;
-  DepthNoise depth_noise;
-  ClassMap classes;
-  TsdfConfig map;
-
-  template <class Visitor>
-  void describe(Visitor& visit) {
-    visit("threads", threads, Range{1, 64}, "Threads.");
-    visit.group("depth_noise", depth_noise, "Noise.");
-    visit.group("classes", classes, "Classes.");
-    visit.group("map", map, "Map.");
   }
 };
 

@@ -1,5 +1,6 @@
 // Every file of test/data/invalid/config has one defect (one file has several) and says in its
-// "# expect:" lines what the error must be after the file's name.
+// "# expect:" lines what the error must be after the file's name, or in an "# expect-rule:" line
+// the whole error.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,9 +22,11 @@ std::vector<std::filesystem::path> invalid_files() {
 
 std::string expected_error(const std::filesystem::path& file) {
   const std::string mark = "# expect: ";
+  const std::string rule_mark = "# expect-rule: ";
   std::vector<std::string> lines;
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
+    if (line.rfind(rule_mark, 0) == 0) return line.substr(rule_mark.size());
     if (line.rfind(mark, 0) == 0) lines.push_back(file.string() + line.substr(mark.size()));
   }
   if (lines.size() == 1) return lines.front();
@@ -35,7 +38,7 @@ std::string expected_error(const std::filesystem::path& file) {
 class InvalidConfigFile : public testing::TestWithParam<std::filesystem::path> {};
 
 TEST_P(InvalidConfigFile, IsRefusedWithTheExpectedText) {
-  SomeGroups config;
+  PipelineConfig config;
   try {
     load_config(config, {GetParam()});
     FAIL() << GetParam() << " was accepted";

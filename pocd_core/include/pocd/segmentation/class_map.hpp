@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ namespace pocd {
 /// dynamic: moves by itself (people, trucks): neither mapped nor tracked. ignore: pixels not used at
 /// all (the robot's own body).
 enum class ClassRole { kBackground, kGround, kObject, kDynamic, kIgnore };
+
+/// "r,g,b" with values 0 to 255; nothing for any other text.
+std::optional<std::array<std::uint8_t, 3>> parse_rgb(const std::string& text);
 
 struct ClassInfo {
   int id = 0;
@@ -47,6 +51,10 @@ struct ClassMap {
   ClassRole role(ClassId id) const;
   int stationarity_class(ClassId id) const;
   std::string name(ClassId id) const;  ///< "class_<id>" when not listed
+
+  /// Rules between the entries that are broken: an index or a colour listed twice, a colour that is
+  /// none. Checked when a configuration is loaded.
+  std::vector<std::string> inconsistencies() const;
 
   template <class Visitor>
   void describe(Visitor& visit) {
