@@ -98,9 +98,9 @@ void TsdfIntegrator::settle(BlockStore& store) {
     }
     if (!outcome.changed) continue;
     store.mark_dirty(slot);
-    if (outcome.owner_low == outcome.owner_high) {
-      store.note_owner(slot, outcome.owner_low);
-    } else if (outcome.owner_low < outcome.owner_high) {
+    if (outcome.owner_any == outcome.owner_all) {
+      store.note_owner(slot, outcome.owner_any);
+    } else if (outcome.owner_any != 0) {
       store.note_owners(slot);
     }
   }

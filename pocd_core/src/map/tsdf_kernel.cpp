@@ -9,98 +9,128 @@ namespace pocd {
 namespace {
 
 constexpr int kVoxels = VoxelBlock::kVoxels;
-constexpr float kBehind = -1e30f;  // signed distance of voxels that no valid pixel sees
+constexpr float kBehind = -1e30f;   // signed distance of voxels that no valid pixel sees
+constexpr float kMinDepth = 0.01f;  // [m]; nearer voxels are left alone
 
-struct Scratch {
-  alignas(64) float distance[kVoxels];       // projective signed distance [m]
-  alignas(64) std::uint32_t owner[kVoxels];  // of the pixel
-};
+// What average() says about a voxel.
+constexpr std::int32_t kContradicted = 1, kApplied = 2, kFree = 4, kSurface = 8, kWasUnknown = 16,
+                       kChanged = 32;
 
-// Looks up the pixel of every voxel (nearest neighbour).
-POCD_KERNEL void project(const KernelFrame& f, float bx, float by, float bz, Scratch& out) {
-  const float* __restrict ox = f.offset_x;
-  const float* __restrict oy = f.offset_y;
-  const float* __restrict oz = f.offset_z;
-  const float* __restrict depth = f.depth;
-  const std::uint32_t* __restrict owners = f.owners;
+// GCC 12 vectorises a loop with a gather only where the arrays are restrict parameters, and mixed
+// conditions only as nested selections or 0/1 integers: hence the shape of these functions.
+
+// Where each voxel projects to (nearest pixel) and minus its depth, or kBehind out of view.
+POCD_KERNEL void find_pixels(const KernelFrame& f, float bx, float by, float bz,
+                             std::int32_t* __restrict pixel, std::int32_t* __restrict owner_pixel,
+                             float* __restrict minus_z) {
   const float width = f.width, height = f.height, fx = f.fx, fy = f.fy;
-  const float cx = f.cx + 0.5f, cy = f.cy + 0.5f, max_depth = f.max_depth;
+  const float cx = f.cx + 0.5f, cy = f.cy + 0.5f;
   const float owner_scale = f.owner_scale, max_u = f.owner_max_u, max_v = f.owner_max_v;
-  const int stride = f.depth_stride, owner_stride = f.owner_stride;
-  float* __restrict distance = out.distance;
-  std::uint32_t* __restrict owner = out.owner;
+  const std::int32_t stride = f.depth_stride, owner_stride = f.owner_stride;
   for (int i = 0; i < kVoxels; ++i) {
-    const float z = bz + oz[i];
+    const float z = bz + f.offset_z[i];
     const float inverse = 1.0f / z;
-    const float u = (bx + ox[i]) * inverse * fx + cx;
-    const float v = (by + oy[i]) * inverse * fy + cy;
-    const bool inside = (z > 0.01f) & (u >= 0.0f) & (u < width) & (v >= 0.0f) & (v < height);
-    const int pu = static_cast<int>(inside ? u : 0.0f);
-    const int pv = static_cast<int>(inside ? v : 0.0f);
-    const float d = depth[pv * stride + pu];
+    const float u = (bx + f.offset_x[i]) * inverse * fx + cx;
+    const float v = (by + f.offset_y[i]) * inverse * fy + cy;
+    const std::int32_t inside = (z > kMinDepth ? 1 : 0) & (u >= 0.0f ? 1 : 0) &
+                                (u < width ? 1 : 0) & (v >= 0.0f ? 1 : 0) & (v < height ? 1 : 0);
+    const auto pu = static_cast<std::int32_t>(inside ? u : 0.0f);
+    const auto pv = static_cast<std::int32_t>(inside ? v : 0.0f);
     const float ou = (static_cast<float>(pu) + 0.5f) * owner_scale;
     const float ov = (static_cast<float>(pv) + 0.5f) * owner_scale;
-    const int ou_px = static_cast<int>(ou < max_u ? ou : max_u);
-    const int ov_px = static_cast<int>(ov < max_v ? ov : max_v);
-    const std::uint32_t o = owners[ov_px * owner_stride + ou_px];
-    const bool valid = inside & (d > 0.0f) & (d <= max_depth) & (o != IntegrationInput::kSkip);
-    distance[i] = valid ? d - z : kBehind;
+    const auto ou_px = static_cast<std::int32_t>(ou < max_u ? ou : max_u);
+    const auto ov_px = static_cast<std::int32_t>(ov < max_v ? ov : max_v);
+    pixel[i] = pv * stride + pu;
+    owner_pixel[i] = ov_px * owner_stride + ou_px;
+    minus_z[i] = inside ? -z : kBehind;
+  }
+}
+
+// Projective signed distance of each voxel, kBehind where no usable pixel sees it.
+POCD_KERNEL void look_up(float max_depth, const float* __restrict depth,
+                         const std::uint32_t* __restrict owners,
+                         const std::int32_t* __restrict pixel,
+                         const std::int32_t* __restrict owner_pixel,
+                         const float* __restrict minus_z, float* __restrict distance,
+                         std::uint32_t* __restrict owner) {
+  for (int i = 0; i < kVoxels; ++i) {
+    const float d = depth[pixel[i]];
+    const std::uint32_t o = owners[owner_pixel[i]];
+    const float s = d + minus_z[i];
+    const float in_range = d <= max_depth ? s : kBehind;
+    const float seen = d > 0.0f ? in_range : kBehind;
+    distance[i] = o != IntegrationInput::kSkip ? seen : kBehind;
     owner[i] = o;
   }
 }
 
-// Running weighted average of the voxels in front of the surface and in the band behind it. Returns
-// whether some voxel was left to carve_block because its stored surface is contradicted.
-POCD_KERNEL bool fuse(const KernelFrame& f, const Scratch& in, VoxelBlock& block,
-                      BlockOutcome& outcome) {
-  const float truncation = f.truncation, band = f.owner_band;
+// Running weighted average of the voxels in front of the surface and in the band behind it. `state`
+// says what became of each voxel. Returns whether some voxel was left to carve() because its stored
+// surface is contradicted.
+POCD_KERNEL bool average(float truncation, float max_weight, float free_weight,
+                         const float* __restrict distance, std::int16_t* __restrict tsdf,
+                         std::uint16_t* __restrict weight, std::int32_t* __restrict state) {
   const float scale = kTsdfScale / truncation;
-  const float max_weight = f.max_weight;
-  const float free_weight = std::min(max_weight, static_cast<float>(kFreeWeight));
-  const float* __restrict distance = in.distance;
-  const std::uint32_t* __restrict pixel_owner = in.owner;
-  std::int16_t* __restrict tsdf = block.tsdf.data();
-  std::uint16_t* __restrict weight = block.weight.data();
-  std::uint32_t* __restrict owner = block.owner.data();
-  std::int32_t changed = 0, contradicted = 0, surface = 0;
-  std::uint32_t low = 0xFFFFFFFFu, high = 0;
+  std::int32_t all = 0;
   for (int i = 0; i < kVoxels; ++i) {
     const float s = distance[i];
     const std::int32_t t_old = tsdf[i];
     const std::int32_t w_old = weight[i];
-    const std::uint32_t o_old = owner[i];
-    const bool contradicts = (s >= truncation) & (w_old > 0) & (t_old < kFreeTsdf);
-    const bool apply = (s >= -truncation) & !contradicts;
+    const std::int32_t contradicts =
+        (s >= truncation ? kContradicted : 0) & (w_old > 0 ? -1 : 0) & (t_old < kFreeTsdf ? -1 : 0);
+    const std::int32_t apply = (s >= -truncation ? -1 : 0) & (contradicts ? 0 : -1);
     const float w = static_cast<float>(w_old);
+    const float t = static_cast<float>(t_old);
     const float target = (s < truncation ? s : truncation) * scale;
-    const float mean = (static_cast<float>(t_old) * w + target) / (w + 1.0f);
+    const float mean = (t * w + target) / (w + 1.0f);
     // Round to nearest: truncation of a positive number is its floor.
-    const float rounded = (apply ? mean : static_cast<float>(t_old)) + 32768.5f;
-    const std::int32_t t_new = static_cast<std::int32_t>(rounded) - 32768;
-    const bool is_free = t_new >= kFreeTsdf;
+    const std::int32_t t_new = static_cast<std::int32_t>((apply ? mean : t) + 32768.5f) - 32768;
+    const std::int32_t is_free = t_new >= kFreeTsdf ? -1 : 0;
     const float cap = is_free ? free_weight : max_weight;
     const float grown = w + 1.0f < cap ? w + 1.0f : cap;
     const std::int32_t w_new = static_cast<std::int32_t>(apply ? grown : w);
-    const bool near = ((s >= -band) & (s <= band)) | ((w_old == 0) & (s < 0.0f));
-    const bool take = apply & near & !is_free;
-    const std::uint32_t o_kept = (apply & is_free) ? 0u : o_old;
-    const std::uint32_t o_new = take ? pixel_owner[i] : o_kept;
     tsdf[i] = static_cast<std::int16_t>(t_new);
     weight[i] = static_cast<std::uint16_t>(w_new);
-    owner[i] = o_new;
-    changed |= (t_new ^ t_old) | (w_new ^ w_old) | static_cast<std::int32_t>(o_new ^ o_old);
-    contradicted |= static_cast<std::int32_t>(contradicts);
-    surface |= static_cast<std::int32_t>((w_new > 0) & !is_free);
-    const std::uint32_t for_low = take ? o_new : 0xFFFFFFFFu;
-    const std::uint32_t for_high = take ? o_new : 0u;
-    low = for_low < low ? for_low : low;
-    high = for_high > high ? for_high : high;
+    const std::int32_t changed = (t_new ^ t_old) | (w_new ^ w_old);
+
+    const std::int32_t surface = (w_new > 0 ? kSurface : 0) & ~is_free & (contradicts ? 0 : -1);
+    const std::int32_t now = contradicts | (apply & kApplied) | (is_free & kFree) | surface |
+                             (w_old == 0 ? kWasUnknown : 0) | (changed ? kChanged : 0);
+    state[i] = now;
+    all |= now;
   }
-  outcome.changed = changed != 0;
-  outcome.has_surface = surface != 0;
-  outcome.owner_low = low;
-  outcome.owner_high = high;
-  return contradicted != 0;
+  state[kVoxels] = all;
+  return (all & kContradicted) != 0;
+}
+
+// Owners of the voxels that average() changed. any and all get the union and the intersection of
+// the bits of the owners written, which are equal when it was one owner only.
+POCD_KERNEL bool own(float band, const float* __restrict distance,
+                     const std::int32_t* __restrict state,
+                     const std::uint32_t* __restrict pixel_owner, std::uint32_t* __restrict owner,
+                     std::uint32_t& any, std::uint32_t& all) {
+  std::uint32_t written_any = 0, written_all = 0xFFFFFFFFu, changed = 0;
+  for (int i = 0; i < kVoxels; ++i) {
+    const float s = distance[i];
+    const std::int32_t now = state[i];
+    const std::uint32_t old = owner[i];
+    const std::int32_t fresh = ((now & kWasUnknown) ? -1 : 0) & (s < 0.0f ? -1 : 0);
+    const std::int32_t near = ((s >= -band ? -1 : 0) & (s <= band ? -1 : 0)) | fresh;
+    const std::int32_t applied = (now & kApplied) ? -1 : 0;
+    const std::int32_t is_free = (now & kFree) ? -1 : 0;
+    const auto take = static_cast<std::uint32_t>(near & applied & ~is_free);
+    const auto release = static_cast<std::uint32_t>(applied & is_free);
+    const std::uint32_t taken = pixel_owner[i] & take;
+    const std::uint32_t now_owner = taken | (old & ~take & ~release);
+    owner[i] = now_owner;
+    const std::uint32_t new_here = (now_owner != old ? 0xFFFFFFFFu : 0u) & take;
+    written_any |= taken & new_here;
+    written_all &= taken | ~new_here;
+    changed |= now_owner ^ old;
+  }
+  any = written_any;
+  all = written_all;
+  return changed != 0;
 }
 
 // Whether a pixel next to the voxel's saw something that is not clearly behind the voxel.
@@ -120,39 +150,45 @@ bool beside_an_edge(const KernelFrame& f, float x, float y, float z) {
 // Voxels that hold a surface where the ray passes well in front of the measured depth. Each such
 // observation halves the weight before it is averaged: one wrong frame moves a settled voxel by one
 // part in max_weight / 2, but log2(max_weight) + 1 frames in a row empty it.
-void carve(const KernelFrame& f, float bx, float by, float bz, const Scratch& in, VoxelBlock& block,
-           BlockOutcome& outcome) {
-  bool surface = false;
+void carve(const KernelFrame& f, float bx, float by, float bz, const std::int32_t* state,
+           VoxelBlock& block, BlockOutcome& outcome) {
   for (int i = 0; i < kVoxels; ++i) {
-    const int w_old = block.weight[i];
-    if (w_old == 0 || block.tsdf[i] >= kFreeTsdf) continue;
-    if (in.distance[i] < f.truncation ||
-        beside_an_edge(f, bx + f.offset_x[i], by + f.offset_y[i], bz + f.offset_z[i])) {
-      surface = true;
+    if (!(state[i] & kContradicted)) continue;
+    if (beside_an_edge(f, bx + f.offset_x[i], by + f.offset_y[i], bz + f.offset_z[i])) {
+      outcome.has_surface = true;
       continue;
     }
-    const int w = w_old / 2;
+    const int w = block.weight[i] / 2;
     const int t = (block.tsdf[i] * w + static_cast<int>(kTsdfScale)) / (w + 1);
     block.tsdf[i] = static_cast<std::int16_t>(t);
     block.weight[i] = static_cast<std::uint16_t>(std::max(w, 1));
     if (t >= kFreeTsdf) {
       block.owner[i] = 0;
     } else {
-      surface = true;
+      outcome.has_surface = true;
     }
     outcome.changed = true;
   }
-  outcome.has_surface = surface;
 }
 
 }  // namespace
 
 BlockOutcome integrate_block(const KernelFrame& frame, float x, float y, float z,
                              VoxelBlock& block) {
-  Scratch scratch;
+  alignas(64) std::int32_t pixel[kVoxels], owner_pixel[kVoxels], state[kVoxels + 1];
+  alignas(64) float minus_z[kVoxels], distance[kVoxels];
+  alignas(64) std::uint32_t owner[kVoxels];
   BlockOutcome outcome;
-  project(frame, x, y, z, scratch);
-  if (fuse(frame, scratch, block, outcome)) carve(frame, x, y, z, scratch, block, outcome);
+  find_pixels(frame, x, y, z, pixel, owner_pixel, minus_z);
+  look_up(frame.max_depth, frame.depth, frame.owners, pixel, owner_pixel, minus_z, distance, owner);
+  const float free_weight = std::min(frame.max_weight, static_cast<float>(kFreeWeight));
+  const bool contradicted = average(frame.truncation, frame.max_weight, free_weight, distance,
+                                    block.tsdf.data(), block.weight.data(), state);
+  outcome.changed = (state[kVoxels] & kChanged) != 0;
+  outcome.has_surface = (state[kVoxels] & kSurface) != 0;
+  outcome.changed |= own(frame.owner_band, distance, state, owner, block.owner.data(),
+                         outcome.owner_any, outcome.owner_all);
+  if (contradicted) carve(frame, x, y, z, state, block, outcome);
   return outcome;
 }
 

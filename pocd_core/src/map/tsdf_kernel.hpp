@@ -45,8 +45,9 @@ struct KernelFrame {
 struct BlockOutcome {
   bool changed = false;
   bool has_surface = false;  // some observed voxel is no free space
-  /// Range of the owners that were written; low > high when none was.
-  std::uint32_t owner_low = 0xFFFFFFFFu, owner_high = 0;
+  /// Bitwise union and intersection of the owners that are new to a voxel: equal when it is one only;
+  /// union 0 when it is none but background.
+  std::uint32_t owner_any = 0, owner_all = 0xFFFFFFFFu;
 };
 
 /// Fuses the frame into one block whose first corner lies at (x, y, z) in the camera frame [m].

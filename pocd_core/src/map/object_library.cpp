@@ -1,0 +1,94 @@
+#include "pocd/map/object_library.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pocd {
+namespace {
+
+constexpr double kCellM = 2.0;
+
+}  // namespace
+
+LibraryObject& ObjectLibrary::create(double spacing_m) {
+  const ObjectId id{next_id_++};
+  return *objects_.emplace(id, std::make_unique<LibraryObject>(id, spacing_m)).first->second;
+}
+
+LibraryObject* ObjectLibrary::find(ObjectId id) {
+  const auto it = objects_.find(id);
+  return it == objects_.end() ? nullptr : it->second.get();
+}
+
+const LibraryObject* ObjectLibrary::find(ObjectId id) const {
+  const auto it = objects_.find(id);
+  return it == objects_.end() ? nullptr : it->second.get();
+}
+
+void ObjectLibrary::erase(ObjectId id) {
+  unfile(id);
+  objects_.erase(id);
+}
+
+void ObjectLibrary::unfile(ObjectId id) {
+  const auto filed = filed_.find(to_index(id));
+  if (filed == filed_.end()) return;
+  for (const Cell cell : filed->second) {
+    const auto it = grid_.find(cell);
+    auto& ids = it->second;
+    ids.erase(std::remove(ids.begin(), ids.end(), id), ids.end());
+    if (ids.empty()) grid_.erase(it);
+  }
+  filed_.erase(filed);
+}
+
+std::vector<ObjectLibrary::Cell> ObjectLibrary::cells_of(const Eigen::Vector2d& low,
+                                                         const Eigen::Vector2d& high) {
+  const auto cell = [](double v) { return static_cast<std::int32_t>(std::floor(v / kCellM)); };
+  std::vector<Cell> cells;
+  for (std::int32_t y = cell(low.y()); y <= cell(high.y()); ++y) {
+    for (std::int32_t x = cell(low.x()); x <= cell(high.x()); ++x) {
+      cells.push_back(static_cast<Cell>(static_cast<std::uint32_t>(x)) << 32 |
+                      static_cast<std::uint32_t>(y));
+    }
+  }
+  return cells;
+}
+
+void ObjectLibrary::place(LibraryObject& object, const OrientedBox& box) {
+  object.box = box;
+  unfile(object.id);
+  const double reach = 0.5 * box.size_m.head<2>().norm();
+  const Eigen::Vector2d center = box.pose.position_W.head<2>();
+  auto& filed = filed_[to_index(object.id)];
+  filed = cells_of(center.array() - reach, center.array() + reach);
+  for (const Cell cell : filed) grid_[cell].push_back(object.id);
+}
+
+std::vector<ObjectId> ObjectLibrary::near(const Eigen::Vector3d& center_W, double radius_m) const {
+  std::vector<ObjectId> ids;
+  for (const Cell cell :
+       cells_of(center_W.head<2>().array() - radius_m, center_W.head<2>().array() + radius_m)) {
+    const auto it = grid_.find(cell);
+    if (it != grid_.end()) ids.insert(ids.end(), it->second.begin(), it->second.end());
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return ids;
+}
+
+ObjectSnapshot snapshot(const LibraryObject& object) {
+  ObjectSnapshot s;
+  s.id = object.id;
+  s.class_id = object.class_id;
+  s.stationarity_class = object.stationarity_class;
+  s.box = object.box;
+  s.belief = object.belief;
+  s.first_seen_ns = object.first_seen_ns;
+  s.last_seen_ns = object.last_seen_ns;
+  s.observations = object.observations;
+  s.last_robot = object.last_robot;
+  return s;
+}
+
+}  // namespace pocd
