@@ -53,7 +53,7 @@ struct ObjectEvent {
   Evidence evidence;
 };
 
-/// A stage and the time it took. Measured by the caller's clock, never used in a decision.
+/// A stage and the time it took. Wall clock; never used in a decision.
 struct StageTiming {
   const char* stage = "";
   double wall_ms = 0.0;
@@ -62,8 +62,11 @@ struct StageTiming {
 struct FrameResult {
   bool accepted = true;             ///< false: the frame was refused as a whole, see warnings
   std::vector<ObjectEvent> events;
-  /// Library entries that are new or changed, by id. Removed ones appear in `events` only.
+  /// Confirmed library entries that are new or changed, by id.
   std::vector<ObjectSnapshot> changed_objects;
+  /// Ids that left the library: removed (with an event), moved under their old id, or found to be a part
+  /// of another object (its event is UPDATED). Ascending.
+  std::vector<ObjectId> retired;
   std::vector<StageTiming> timings;
   /// One line each, e.g. "pose jump of 0.31 m: frame not used for object states".
   std::vector<std::string> warnings;

@@ -10,6 +10,7 @@
 #include "pocd/config/describe.hpp"
 #include "pocd/input/depth_noise.hpp"
 #include "pocd/map/tsdf_map.hpp"
+#include "pocd/pipeline/pose_gate.hpp"
 #include "pocd/segmentation/class_map.hpp"
 #include "pocd/segmentation/segmentation_config.hpp"
 #include "pocd/state/state_config.hpp"
@@ -19,6 +20,7 @@ namespace pocd {
 struct PipelineConfig {
   int threads = 1;
   DepthNoise depth_noise;
+  PoseGateConfig pose_gate;
   ClassMap classes;
   SegmentationConfig segmentation;
   AssociationConfig association;
@@ -30,6 +32,7 @@ struct PipelineConfig {
   void describe(Visitor& visit) {
     visit("threads", threads, Range{1, 64}, "Threads of the pipeline; results do not depend on it.");
     visit.group("depth_noise", depth_noise, "Noise of the depth camera.");
+    visit.group("pose_gate", pose_gate, "Refusing frames with impossible poses.");
     visit.group("classes", classes, "Meaning of the segmentation's class indices.");
     visit.group("segmentation", segmentation, "From image to observations.");
     visit.group("association", association, "Which observation is which object.");

@@ -11,11 +11,13 @@ struct StateConfig {
   double initial_sigma_m = 0.5;
   double max_stationarity = 0.9999;
   double max_count = 12.0;
+  double min_sigma_m = 0.1;
   double remove_below = 0.4;
   double k = 3.0;
   int confirm_observations = 3;
   int tentative_frames = 15;
-  int erode_frames = 6;
+  int erode_frames = 8;
+  int merge_frames = 10;
   double relocation_window_s = 60.0;
 
   template <class Visitor>
@@ -27,6 +29,8 @@ struct StateConfig {
           "An update that would raise E[v] above this is not applied, v_max.");
     visit("max_count", max_count, Range{1.0, 1e6},
           "Cap of alpha + beta: how much past evidence an object can hold against new evidence.");
+    visit("min_sigma_m", min_sigma_m, Range{0.0, 10.0},
+          "Floor of sigma: how far past measurements can fix the believed change [m].");
     visit("remove_below", remove_below, Range{0.0, 1.0},
           "Objects with E[v] below this are removed from library and map, theta_stat.");
     visit("k", k, Range{0.0, 100.0},
@@ -38,6 +42,8 @@ struct StateConfig {
           "A new object that is in view this many frames without being confirmed is forgotten [frames].");
     visit("erode_frames", erode_frames, Range{1, 1000},
           "A point of an object that is seen through in this many frames in a row is dropped [frames].");
+    visit("merge_frames", merge_frames, Range{1, 100000},
+          "Objects of one class that share an observation in this many frames are one [frames].");
     visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
           "A removed object and a new one of like class and size within this time are one MOVED [s].");
   }

@@ -1,0 +1,75 @@
+// The objects the system believes in, and those it is about to.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "pocd/association/icp_target.hpp"
+#include "pocd/map/object_model.hpp"
+#include "pocd/pipeline/frame_result.hpp"
+
+namespace pocd {
+
+struct LibraryObject {
+  LibraryObject(ObjectId object_id, double spacing_m) : id(object_id), model(spacing_m) {}
+
+  ObjectId id;
+  ClassId class_id = 0;
+  int stationarity_class = 0;
+  bool confirmed = false;  ///< false: tentative, known to nobody outside
+  ObjectModel model;
+  OrientedBox box;
+  Belief belief;
+  StampNs first_seen_ns = 0;
+  StampNs last_seen_ns = 0;
+  std::string last_robot;
+  std::uint32_t observations = 0;
+  int frames_in_view = 0;        ///< tentative only
+  int frames_seen_through = 0;   ///< in a row
+  OrientedBox reported_box;      ///< as in the last event
+  bool grew = false;             ///< gained points since the last event
+  bool shrank = false;           ///< lost points since the last event
+  bool changed = false;          ///< since the last FrameResult
+  std::size_t box_surfels = 0;   ///< size of the model when the box was fitted
+  std::size_t most_surfels = 0;
+  /// Objects that share an observation with this one, and for how many frames.
+  std::map<ObjectId, int> companions;
+  /// Alignment target made of the model; dropped when the model changes.
+  std::shared_ptr<const IcpTarget> icp_target;
+};
+
+/// Objects by id, with a grid over the ground plane to find those near a place: a frame's cost depends
+/// on what is in view. Not thread-safe.
+class ObjectLibrary {
+ public:
+  LibraryObject& create(double spacing_m);
+  LibraryObject* find(ObjectId id);
+  const LibraryObject* find(ObjectId id) const;
+  void erase(ObjectId id);
+
+  /// Sets the box and files the object where it lies.
+  void place(LibraryObject& object, const OrientedBox& box);
+
+  /// Ids of objects whose box may lie within `radius_m` of `center_W` (horizontally), ascending.
+  std::vector<ObjectId> near(const Eigen::Vector3d& center_W, double radius_m) const;
+
+  std::size_t size() const { return objects_.size(); }
+  const std::map<ObjectId, std::unique_ptr<LibraryObject>>& all() const { return objects_; }
+
+ private:
+  using Cell = std::uint64_t;
+  static std::vector<Cell> cells_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
+  void unfile(ObjectId id);
+
+  std::map<ObjectId, std::unique_ptr<LibraryObject>> objects_;
+  std::unordered_map<Cell, std::vector<ObjectId>> grid_;
+  std::unordered_map<std::uint32_t, std::vector<Cell>> filed_;
+  std::uint32_t next_id_ = 1;
+};
+
+ObjectSnapshot snapshot(const LibraryObject& object);
+
+}  // namespace pocd

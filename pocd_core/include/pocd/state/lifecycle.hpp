@@ -1,0 +1,56 @@
+// Rules of an object's life: how a measurement changes its belief, and when it is removed or has moved.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "pocd/association/visibility.hpp"
+#include "pocd/change/change_config.hpp"
+#include "pocd/map/object_library.hpp"
+#include "pocd/state/state_config.hpp"
+
+namespace pocd {
+
+/// Steps 6 of the method: k by class and kind of measurement, the Bayesian update, the bound v_max, the
+/// cap of alpha + beta, the floor of sigma. Changes object.belief and returns why, without a rule.
+Evidence apply_measurement(LibraryObject& object, double delta_m, const Sighting& sighting,
+                           const StateConfig& state, const ChangeConfig& change);
+
+/// The belief after one measurement, as apply_measurement makes it: every published transition can be
+/// recomputed with it from the evidence alone.
+Belief next_belief(const Belief& before, double delta_m, int stationarity_class, double k,
+                   const StateConfig& state, const ChangeConfig& change);
+
+/// Name of the rule by which the object is to be removed now, if any:
+/// "stationarity_below_threshold", "change_established", "nothing_left", "never_confirmed",
+/// "candidate_seen_through".
+std::optional<std::string> removal_rule(const LibraryObject& object, const StateConfig& state,
+                                        const ChangeConfig& change);
+
+/// True when two boxes may be the same thing seen in part: heights and both horizontal sizes agree
+/// within 35 % or `slack_m`, whichever is more.
+bool alike(const OrientedBox& a, const OrientedBox& b, double slack_m);
+
+/// Remembers what was removed, so that a like object that turns up is reported as moved.
+class RelocationMemory {
+ public:
+  struct Removed {
+    ObjectId id;
+    ClassId class_id;
+    OrientedBox box;
+    StampNs first_seen_ns;
+    StampNs removed_ns;
+  };
+  void remember(const Removed& removed) { removed_.push_back(removed); }
+
+  /// Takes out and returns the nearest removed object of this class and like size; entries older than
+  /// the window are forgotten.
+  std::optional<Removed> take(ClassId class_id, const OrientedBox& box, StampNs now_ns, double window_s,
+                              double slack_m);
+
+ private:
+  std::deque<Removed> removed_;
+};
+
+}  // namespace pocd

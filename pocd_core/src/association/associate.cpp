@@ -1,0 +1,158 @@
+#include "pocd/association/associate.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pocd/association/assignment.hpp"
+#include "pocd/association/point_to_plane_icp.hpp"
+
+namespace pocd {
+namespace {
+
+/// Share of what is visible of an object that decides for it: above one half is a majority.
+constexpr double kMajority = 0.5;
+/// Fewer visible points than this decide nothing.
+constexpr int kMinVisible = 5;
+/// Share of an observation near an object's surface that makes it a piece of that object.
+constexpr double kPieceShare = 0.3;
+constexpr int kShareBudget = 100;
+
+const Sighting::Touch* find_touch(const Sighting& sighting, std::int32_t observation) {
+  for (const auto& t : sighting.touches) {
+    if (t.observation == observation) return &t;
+  }
+  return nullptr;
+}
+
+bool in_doubt(const Sighting& s) { return s.visible() >= kMinVisible && s.seen_through_share() > kMajority; }
+
+std::shared_ptr<const IcpTarget> target_of(LibraryObject& object, double max_distance_m) {
+  if (!object.icp_target) {
+    Points points, normals;
+    for (const Surfel& s : object.model.surfels()) {
+      points.push_back(s.point_W);
+      normals.push_back(s.normal_W);
+    }
+    const double inlier = 1.5 * object.model.spacing_m();
+    object.icp_target =
+        std::make_shared<IcpTarget>(points, normals, inlier, std::max(inlier, max_distance_m));
+  }
+  return object.icp_target;
+}
+
+Eigen::Vector3d centroid(const Points& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& p : points) sum += p.cast<double>();
+  return sum / static_cast<double>(points.size());
+}
+
+/// Aligns the observation with the object; false when they are not alike.
+bool align(LibraryObject& object, const Observation& observation, const Pose& T_W_C,
+           const AssociationConfig& config, Match& match) {
+  Points source;
+  const std::size_t step = std::max<std::size_t>(1, observation.points.size() / config.icp_points);
+  for (std::size_t i = 0; i < observation.points.size(); i += step) {
+    source.push_back(observation.points[i].point_W);
+  }
+  const auto target = target_of(object, config.icp_max_distance_m);
+  IcpOptions options;
+  options.max_iterations = config.icp_iterations;
+  options.robust_scale_m = object.model.spacing_m();
+  // Start with the centres on each other where that is within the gate: ICP finds the rest.
+  Pose start = Pose::Identity();
+  const Eigen::Vector3d offset = object.box.pose.position_W - observation.box.pose.position_W;
+  start.translation() = Eigen::Vector3d(offset.x(), offset.y(), 0.0);
+  IcpResult best = point_to_plane_icp(*target, source, options, start);
+  const IcpResult in_place = point_to_plane_icp(*target, source, options);
+  if (in_place.dissimilarity <= best.dissimilarity) best = in_place;
+  if (best.dissimilarity > config.max_dissimilarity) return false;
+
+  const Eigen::Vector3d center = centroid(source);
+  const Eigen::Vector3d moved = center - best.T_target_source * center;  // old place to new place
+  match.T_new_old = best.T_target_source.inverse();
+  match.displacement_m = moved.norm();
+  // Positive when the observation is nearer to the camera than the object was.
+  match.sign = (T_W_C.linear().transpose() * moved).z() < 0.0 ? 1 : -1;
+  match.cost = config.lambda_translation * match.displacement_m +
+               config.lambda_rotation * std::abs(Eigen::AngleAxisd(best.T_target_source.linear()).angle());
+  match.stationary = false;
+  return true;
+}
+
+}  // namespace
+
+AssociationResult associate(const Candidate* candidates, std::size_t count,
+                            const Observations& observations, const Pose& T_W_C,
+                            const AssociationConfig& config) {
+  AssociationResult result;
+  std::vector<Match> pairs;
+  std::vector<AssignmentCandidate> gated;
+  // Best in-place object of each observation, for pieces.
+  std::vector<double> best_share(observations.list.size(), 0.0);
+  std::vector<std::size_t> best_candidate(observations.list.size(), 0);
+
+  for (std::size_t c = 0; c < count; ++c) {
+    LibraryObject& object = *candidates[c].object;
+    const Sighting& sighting = candidates[c].sighting;
+    const bool doubtful = in_doubt(sighting);
+    for (std::size_t j = 0; j < observations.list.size(); ++j) {
+      const Observation& observation = observations.list[j];
+      const double class_cost = observation.class_id == object.class_id ? 0.0 : config.lambda_class;
+      if (class_cost > config.cutoff_cost) continue;
+      const double distance = (object.box.pose.position_W - observation.box.pose.position_W).norm();
+      const double spacing = object.model.spacing_m();
+      const bool overlapping = box_overlap(object.box, observation.box, 4.0 * spacing) > 0.0;
+      if (distance >= config.max_distance_m && !overlapping) continue;
+
+      Match match;
+      match.candidate = c;
+      match.observation = static_cast<std::int32_t>(j);
+      const Sighting::Touch* touch = find_touch(sighting, match.observation);
+      if (!doubtful) {
+        const double share = overlapping ? object.model.explained_share(
+                                               observation.points, static_cast<float>(1.5 * spacing), kShareBudget)
+                                         : 0.0;
+        if (share > best_share[j]) best_share[j] = share, best_candidate[j] = c;
+        const bool holds_object = touch && touch->hit >= kMinVisible && touch->hit > kMajority * sighting.visible();
+        const bool explained = touch && touch->hit > 0 && share > kMajority;
+        if (holds_object || explained) {
+          match.cost = class_cost + 1.0 - share;
+          pairs.push_back(match);
+          gated.push_back({static_cast<int>(c), static_cast<int>(j), match.cost});
+          continue;
+        }
+      }
+      // Only an object whose place is empty, or taken by something right in front, may have moved.
+      const bool covered = touch && touch->in_front >= kMinVisible &&
+                           touch->in_front > kMajority * (sighting.visible() + sighting.occluded);
+      if (!(doubtful || covered) || distance >= config.max_distance_m) continue;
+      if (object.model.surfels().empty() || !align(object, observation, T_W_C, config, match)) continue;
+      match.cost += class_cost;
+      if (match.cost > config.cutoff_cost) continue;
+      pairs.push_back(match);
+      gated.push_back({static_cast<int>(c), static_cast<int>(j), match.cost});
+    }
+  }
+
+  std::vector<bool> taken(observations.list.size(), false);
+  for (const auto& [row, col] : assign(gated, config.cutoff_cost)) {
+    for (const Match& pair : pairs) {
+      if (static_cast<int>(pair.candidate) != row || pair.observation != col) continue;
+      result.matches.push_back(pair);
+      taken[col] = true;
+    }
+  }
+  std::sort(result.matches.begin(), result.matches.end(),
+            [](const Match& a, const Match& b) { return a.candidate < b.candidate; });
+  for (std::size_t j = 0; j < observations.list.size(); ++j) {
+    if (taken[j]) continue;
+    if (best_share[j] >= kPieceShare) {
+      result.pieces.push_back({static_cast<std::int32_t>(j), best_candidate[j]});
+    } else {
+      result.unassigned.push_back(static_cast<std::int32_t>(j));
+    }
+  }
+  return result;
+}
+
+}  // namespace pocd

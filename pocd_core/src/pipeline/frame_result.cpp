@@ -1,0 +1,15 @@
+#include "pocd/pipeline/frame_result.hpp"
+
+namespace pocd {
+
+const char* to_string(EventKind kind) {
+  switch (kind) {
+    case EventKind::kAdded: return "ADDED";
+    case EventKind::kUpdated: return "UPDATED";
+    case EventKind::kMoved: return "MOVED";
+    case EventKind::kRemoved: return "REMOVED";
+  }
+  return "";
+}
+
+}  // namespace pocd

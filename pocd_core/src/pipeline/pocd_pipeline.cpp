@@ -1,0 +1,122 @@
+#include "pocd/pipeline/pocd_pipeline.hpp"
+
+#include <chrono>
+
+#include "object_tracker.hpp"
+#include "pocd/common/check.hpp"
+
+namespace pocd {
+namespace {
+
+/// Wall time per stage, for reports only.
+class StageClock {
+ public:
+  explicit StageClock(std::vector<StageTiming>& timings) : timings_(timings), last_(now()) {}
+  void done(const char* stage) {
+    const auto t = now();
+    timings_.push_back({stage, std::chrono::duration<double, std::milli>(t - last_).count()});
+    last_ = t;
+  }
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  static Time now() { return std::chrono::steady_clock::now(); }
+  std::vector<StageTiming>& timings_;
+  Time last_;
+};
+
+}  // namespace
+
+struct PocdPipeline::Impl {
+  explicit Impl(const PipelineConfig& c)
+      : config(c), classes(c.classes), pool(c.threads), pose_gate(c.pose_gate), tracker(c), map(c.map) {}
+
+  PipelineConfig config;
+  ClassTable classes;
+  ThreadPool pool;
+  PoseGate pose_gate;
+  GroundModel ground;
+  ObjectTracker tracker;
+  TsdfMap map;
+  // Memory of a frame, kept between frames.
+  OrganizedCloud cloud;
+  PlaneSegmentation planes;
+  Observations observations;
+  DepthField field;
+  std::vector<std::uint32_t> owner_of_observation;
+  std::vector<std::uint32_t> owners;
+
+  void paint_owners();
+  void integrate(const Frame& frame);
+};
+
+PocdPipeline::PocdPipeline(const PipelineConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+PocdPipeline::~PocdPipeline() = default;
+
+FrameResult PocdPipeline::process_frame(const Frame& frame) {
+  Impl& p = *impl_;
+  if (frame.depth_m.type() != CV_32FC1 || frame.depth_m.cols != frame.camera.width ||
+      frame.depth_m.rows != frame.camera.height) {
+    throw InputError("frame " + std::to_string(frame.sequence) + ": depth is not the camera's size in metres");
+  }
+  FrameResult result;
+  if (const auto reason = p.pose_gate.refuse(frame)) {
+    result.accepted = false;
+    result.warnings.push_back(*reason + ": frame not used");
+    return result;
+  }
+  StageClock clock(result.timings);
+  const auto& segmentation = p.config.segmentation;
+  const auto& noise = p.config.depth_noise;
+
+  organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes, p.pool, p.cloud);
+  clock.done("organize");
+  segment_planes(p.cloud, segmentation, noise, p.planes);
+  vote_planes(p.planes, segmentation.majority_share, p.cloud);
+  p.ground.update(p.planes, segmentation, noise, p.cloud);
+  clock.done("clean");
+  extract_observations(segmentation, noise, p.config.map.voxel_size_m, p.planes, p.cloud, p.observations);
+  clock.done("cluster");
+  p.field.update(p.cloud);
+  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation, result);
+  clock.done("objects");
+  p.integrate(frame);
+  clock.done("map");
+  return result;
+}
+
+void PocdPipeline::Impl::paint_owners() {
+  owners.resize(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const std::int32_t observation = observations.observation_of[i];
+    if (cloud.kind[i] == PixelKind::kDynamic || cloud.kind[i] == PixelKind::kIgnore) {
+      owners[i] = IntegrationInput::kSkip;
+    } else {
+      owners[i] = observation == Observations::kNone ? 0 : owner_of_observation[observation];
+    }
+  }
+}
+
+void PocdPipeline::Impl::integrate(const Frame& frame) {
+  paint_owners();
+  IntegrationInput input;
+  input.frame = &frame;
+  input.owners = owners.data();
+  input.owner_width = cloud.width;
+  input.owner_height = cloud.height;
+  input.owner_stride = cloud.stride;
+  map.integrate(input, pool);
+}
+
+std::vector<ObjectSnapshot> PocdPipeline::objects() const {
+  std::vector<ObjectSnapshot> list;
+  for (const auto& [id, object] : impl_->tracker.library().all()) {
+    if (object->confirmed) list.push_back(snapshot(*object));
+  }
+  return list;
+}
+
+TsdfMap& PocdPipeline::map() { return impl_->map; }
+const TsdfMap& PocdPipeline::map() const { return impl_->map; }
+
+}  // namespace pocd
