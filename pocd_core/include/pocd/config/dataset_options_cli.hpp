@@ -9,8 +9,9 @@ class App;
 
 namespace pocd {
 
-/// Adds --dataset, --input, --repeat, --rate, --gravity and --seed to `app`; parsing it fills
-/// `options`, which must outlive the parse. A bad value is a usage error of CLI11.
+/// Adds --dataset, --input, --repeat, --rate, --gravity, --camera, --camera-pose, --mount, --seed and
+/// --sensor to `app`; parsing it fills
+/// `options`, which must outlive the parse. A bad value is a CLI::ParseError.
 void add_dataset_options(CLI::App& app, DatasetOptions& options);
 
 }  // namespace pocd

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Builds the workspace with colcon into build/ and install/ (one merged prefix, Release).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+usage() {
+  cat <<'TEXT'
+usage: build.sh [--core] [--tests] [--werror] [-- CMAKE_ARGUMENT...]
+  --core     only pocd_core (library, pocd_map, pocd_parameters): needs no Fast DDS
+  --tests    also the tests and benchmarks
+  --werror   warnings are errors
+example: build.sh --tests -- -DCMAKE_BUILD_TYPE=Debug
+TEXT
+}
+
+selection=(--packages-skip pocd_test)
+werror=OFF
+while [[ $# -gt 0 ]]; do
+  case "$1" in
+    --core) selection=(--packages-select pocd_core) ;;
+    --tests) selection=() ;;
+    --werror) werror=ON ;;
+    --help | -h) usage && exit 0 ;;
+    --) shift && break ;;
+    *) usage >&2 && exit 2 ;;
+  esac
+  shift
+done
+
+# A compiler of PCL code takes up to 2 GB: no more at once than fit.
+available_gb=$(($(sed -n 's/^MemAvailable: *\([0-9]*\) kB/\1/p' /proc/meminfo) / 1048576))
+jobs=$(nproc)
+((jobs > available_gb / 2)) && jobs=$((available_gb / 2))
+((jobs < 1)) && jobs=1
+
+export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs
+colcon --log-level error build --merge-install --executor sequential "${selection[@]}" \
+  --event-handlers console_cohesion- desktop_notification- \
+  --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "$@"
