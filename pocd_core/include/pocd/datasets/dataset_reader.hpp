@@ -25,7 +25,8 @@ class DatasetReader {
  public:
   virtual ~DatasetReader() = default;
 
-  /// The next good frame, or nothing at the end.
+  /// The next good frame, or nothing at the end. Frame::sequence is the frame's number in the listing,
+  /// bad ones counted, so that a message can be traced to its file.
   virtual std::optional<Frame> next() = 0;
   /// Number of frames the source lists (good or bad), 0 if not known.
   virtual std::size_t size() const = 0;
@@ -35,22 +36,40 @@ class DatasetReader {
   std::size_t skipped() const { return skipped_; }
 
  protected:
+  void skip(const std::string& problem) {
+    problems_.push_back(problem);
+    ++skipped_;
+  }
+
   std::vector<std::string> problems_;
   std::size_t skipped_ = 0;
 };
 
 struct DatasetOptions {
   std::string format;  ///< "torwic", "rgbd", "pcd", "sim"
-  std::vector<std::filesystem::path> inputs;  ///< visited in order as one run; stamps are shifted to go on
-  int repeat = 1;        ///< frames made of each still image (pcd)
+  /// Visited in order as one run; stamps are shifted to go on. Folders, or scenario files for "sim".
+  std::vector<std::filesystem::path> inputs;
+  int repeat = 1;               ///< frames made of each still image (pcd), >= 1
   double frame_rate_hz = 15.0;  ///< for sources without stamps
   /// Unit vector pointing down in the source's world frame; frames are rotated so that it becomes -z.
-  Eigen::Vector3d gravity_W = -Eigen::Vector3d::UnitZ();
+  /// Not given: the folder's gravity.txt (three numbers), or -z without one (rgbd).
+  std::optional<Eigen::Vector3d> gravity_W;
   std::uint64_t seed = 1;  ///< simulator noise
+  /// Intrinsics of sources that do not bring their own (pcd), or other than TorWIC's (torwic).
+  std::optional<CameraModel> camera;
+  /// Fixed camera pose T_W_C of sources that do not bring one (pcd).
+  std::optional<Pose> T_W_C;
+  /// Camera on the robot (torwic); not given: TorWIC's front camera.
+  std::optional<CameraExtrinsics> extrinsics;
+  /// Labels are class * label_divisor + instance for sources that know instances (pcd, sim); 1: class.
+  int label_divisor = 1;
+  std::string sensor;      ///< sim: "" as the scenario says, or "perfect", "stereo"
+  bool with_color = true;  ///< sim: colour images cost time
 };
 
 /// Throws InputError: unknown format (listing the known ones), missing or empty folder, unreadable
-/// intrinsics; the text names the path.
+/// intrinsics; the text names the path. Part of the configuration library (pocd::config), since the
+/// simulator's scenarios and a PCD sequence's camera are YAML.
 std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options);
 
 }  // namespace pocd

@@ -1,0 +1,27 @@
+// Images of data sets. All throw InputError naming the file: missing, damaged, or of the wrong kind.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+namespace pocd {
+
+/// One channel of 16 bits, millimetres.
+cv::Mat read_depth_image(const std::filesystem::path& file);
+/// One channel of 8 or 16 bits, class indices.
+cv::Mat read_label_image(const std::filesystem::path& file);
+/// Any picture, as 8-bit BGR.
+cv::Mat read_color_image(const std::filesystem::path& file);
+
+/// Regular files of a folder whose name is prefix + digits + suffix, by the number; empty when the
+/// folder is missing. Throws InputError for two files with one number.
+std::map<int, std::filesystem::path> numbered_files(const std::filesystem::path& folder,
+                                                    const std::string& prefix,
+                                                    const std::string& suffix);
+
+/// Throws InputError unless `folder` is a folder.
+void require_folder(const std::filesystem::path& folder);
+
+}  // namespace pocd

@@ -1,0 +1,142 @@
+#include <cmath>
+#include <set>
+
+#include "image_file.hpp"
+#include "pocd/common/check.hpp"
+#include "pocd/datasets/readers.hpp"
+#include "text_file.hpp"
+
+namespace pocd {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Folder {
+  fs::path path;
+  CameraModel camera;  // sizes come with the first depth image
+  Eigen::Quaterniond R_level_W;
+};
+
+struct Entry {
+  std::size_t folder;
+  int number;
+  fs::path depth, pose, color;  // empty: the file is missing
+};
+
+CameraModel read_intrinsics(const fs::path& file) {
+  const Eigen::MatrixXd K = read_matrix(file, 3, 3);
+  CameraModel camera;
+  camera.fx = K(0, 0), camera.fy = K(1, 1), camera.cx = K(0, 2), camera.cy = K(1, 2);
+  camera.width = camera.height = 1;
+  validate(camera, file.string());
+  if (K(0, 1) != 0.0 || K(1, 0) != 0.0 || K(2, 0) != 0.0 || K(2, 1) != 0.0 || K(2, 2) != 1.0) {
+    throw InputError(file.string() + ": is no intrinsics matrix [fx 0 cx; 0 fy cy; 0 0 1]");
+  }
+  camera.width = camera.height = 0;
+  return camera;
+}
+
+Eigen::Quaterniond levelling(const Eigen::Vector3d& gravity_W, const std::string& source) {
+  if (!gravity_W.allFinite() || std::abs(gravity_W.norm() - 1.0) > 0.01) {
+    throw InputError(source + ": gravity must be a unit vector, has length " +
+                     std::to_string(gravity_W.norm()));
+  }
+  return Eigen::Quaterniond::FromTwoVectors(gravity_W, -Eigen::Vector3d::UnitZ());
+}
+
+class RgbdReader : public DatasetReader {
+ public:
+  explicit RgbdReader(const DatasetOptions& options)
+      : period_ns_(std::llround(1e9 / options.frame_rate_hz)) {
+    for (const fs::path& path : options.inputs) {
+      require_folder(path);
+      Eigen::Vector3d gravity_W = options.gravity_W.value_or(-Eigen::Vector3d::UnitZ());
+      const fs::path gravity_file = path / "gravity.txt";
+      std::string source = "option gravity";
+      if (!options.gravity_W && fs::exists(gravity_file)) {
+        gravity_W = read_matrix(gravity_file, 1, 3).transpose();
+        source = gravity_file.string();
+      }
+      folders_.push_back({path, read_intrinsics(path / "camera-intrinsics.txt"),
+                          levelling(gravity_W, source)});
+      list(folders_.size() - 1);
+    }
+  }
+
+  std::size_t size() const override { return entries_.size(); }
+
+  std::optional<Frame> next() override {
+    while (next_ < entries_.size()) {
+      const std::size_t index = next_++;
+      try {
+        return read(index);
+      } catch (const InputError& error) {
+        skip(error.what());
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  void list(std::size_t folder) {
+    const fs::path& path = folders_[folder].path;
+    const auto depths = numbered_files(path, "frame-", ".depth.png");
+    const auto poses = numbered_files(path, "frame-", ".pose.txt");
+    auto colors = numbered_files(path, "frame-", ".color.jpg");
+    colors.merge(numbered_files(path, "frame-", ".color.png"));
+    std::set<int> numbers;
+    for (const auto* files : {&depths, &poses, static_cast<decltype(&depths)>(&colors)}) {
+      for (const auto& file : *files) numbers.insert(file.first);
+    }
+    if (depths.empty()) throw InputError(path.string() + ": no frame-NNNNNN.depth.png in it");
+    const auto file_of = [](const std::map<int, fs::path>& files, int number) {
+      const auto found = files.find(number);
+      return found == files.end() ? fs::path() : found->second;
+    };
+    for (const int number : numbers) {
+      entries_.push_back({folder, number, file_of(depths, number), file_of(poses, number),
+                          file_of(colors, number)});
+    }
+  }
+
+  Frame read(std::size_t index) {
+    const Entry& entry = entries_[index];
+    Folder& folder = folders_[entry.folder];
+    const auto missing = [&](const char* what, const fs::path& present) {
+      throw InputError(present.string() + ": has no " + what + " file beside it");
+    };
+    if (entry.depth.empty()) missing("depth", entry.pose.empty() ? entry.color : entry.pose);
+    if (entry.pose.empty()) missing("pose", entry.depth);
+    const Eigen::MatrixXd matrix = read_matrix(entry.pose, 4, 4);
+    Pose T_W_C = Pose::Identity();
+    T_W_C.matrix() = matrix;
+    if ((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6) {
+      throw InputError(entry.pose.string() + ": last row is not 0 0 0 1");
+    }
+    validate_pose(T_W_C, entry.pose.string());
+    T_W_C.linear() = Eigen::Quaterniond(T_W_C.linear()).normalized().toRotationMatrix();
+    const cv::Mat depth = read_depth_image(entry.depth);
+    const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
+    CameraModel camera = folder.camera;
+    if (camera.width == 0) camera.width = depth.cols, camera.height = depth.rows;
+    const Pose T_level_C = folder.R_level_W * T_W_C;
+    Frame frame = make_frame(static_cast<StampNs>(index) * period_ns_, camera, T_level_C, depth,
+                             cv::Mat(), color, entry.depth.string());
+    folder.camera = camera;
+    frame.sequence = index;
+    return frame;
+  }
+
+  StampNs period_ns_;
+  std::vector<Folder> folders_;
+  std::vector<Entry> entries_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<DatasetReader> open_rgbd(const DatasetOptions& options) {
+  return std::make_unique<RgbdReader>(options);
+}
+
+}  // namespace pocd

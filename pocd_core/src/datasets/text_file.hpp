@@ -1,0 +1,30 @@
+// Small text files of numbers, read strictly: an error names file and line.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pocd/common/types.hpp"
+
+namespace pocd {
+
+struct NumberedLine {
+  int number = 0;  ///< from 1
+  std::string text;
+};
+
+/// Lines that are neither empty nor comments (#). Throws InputError when the file cannot be read.
+std::vector<NumberedLine> read_lines(const std::filesystem::path& file);
+
+/// "file:line", which begins every error text about that line.
+std::string place(const std::filesystem::path& file, int line);
+
+/// The finite numbers of a line, exactly `count`, separated by blanks or commas. Throws InputError.
+std::vector<double> parse_numbers(const NumberedLine& line, std::size_t count,
+                                  const std::filesystem::path& file);
+
+/// A matrix of `rows` x `columns` finite numbers, a row per line. Throws InputError.
+Eigen::MatrixXd read_matrix(const std::filesystem::path& file, int rows, int columns);
+
+}  // namespace pocd
