@@ -129,7 +129,7 @@ std::optional<RayTracedChange> ray_traced_change(const Points& object_C,
                                                  double icp_translation_z_C_m,
                                                  const RayTracedChangeOptions& options) {
   POCD_CHECK(options.voxel_size_m > 0.0 && options.truncation_m >= options.voxel_size_m);
-  POCD_CHECK(options.lambda_diff > 0.0 && std::isfinite(icp_translation_z_C_m));
+  POCD_CHECK(options.lambda_diff >= 0.0 && std::isfinite(icp_translation_z_C_m));
 
   Band band(4 * object_C.size());
   for (const auto& p : object_C) {

@@ -15,7 +15,7 @@ struct RayTracedChangeOptions {
   /// Half the thickness of the band around each surface, >= voxel_size_m. Surfaces farther apart
   /// than twice this along the ray share no voxel.
   double truncation_m = 0.2;
-  double lambda_diff = 1.6;  ///< scale of the published measure, > 0
+  double lambda_diff = 1.6;  ///< scale of the published measure, >= 0
 };
 
 struct RayTracedChange {
