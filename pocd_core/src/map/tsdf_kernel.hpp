@@ -45,8 +45,8 @@ struct KernelFrame {
 struct BlockOutcome {
   bool changed = false;
   bool has_surface = false;  // some observed voxel is no free space
-  /// Bitwise union and intersection of the owners that are new to a voxel: equal when it is one only;
-  /// union 0 when it is none but background.
+  /// Bitwise union and intersection of the owners that are new to a voxel: equal when it is one
+  /// only; union 0 when it is none but background.
   std::uint32_t owner_any = 0, owner_all = 0xFFFFFFFFu;
 };
 

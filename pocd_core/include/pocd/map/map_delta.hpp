@@ -1,5 +1,5 @@
-// What leaves the process: quantised, compressed tiles and versioned deltas whose digest proves that
-// a copy is the original.
+// What leaves the process: quantised, compressed tiles and versioned deltas whose digest proves
+// that a copy is the original.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@ namespace pocd {
 using TileKey = BlockKey;
 constexpr int kTileSide = 16;
 
-/// Sum modulo 2^128 of one XXH3-128 hash per tile of (key, payload): does not depend on order, and a
-/// changed tile costs one subtraction and one addition.
+/// Sum modulo 2^128 of one XXH3-128 hash per tile of (key, payload): does not depend on order, and
+/// a changed tile costs one subtraction and one addition.
 struct MapDigest {
   std::uint64_t low = 0, high = 0;
   bool operator==(const MapDigest& o) const { return low == o.low && high == o.high; }
@@ -26,7 +26,7 @@ struct MapDigest {
 };
 
 /// One published tile. payload: zstd frame of the quantised voxels; the layout is documented in
-/// docs/topics_and_qos.md and checked by decode_tile.
+/// docs/tile_format.md and checked by decode_tile.
 struct MapTile {
   TileKey key;
   std::uint64_t version = 0;  ///< map version at which the tile last changed
@@ -42,7 +42,8 @@ struct DecodedTile {
   std::array<std::uint32_t, kTileSide * kTileSide * kTileSide> owner;
 };
 
-/// Throws InputError with the reason for a payload that is no tile (bounded memory whatever the bytes).
+/// Throws InputError with the reason for a payload that is no tile (bounded memory whatever the
+/// bytes).
 DecodedTile decode_tile(const std::vector<std::uint8_t>& payload, double truncation_m);
 
 /// One step of the published map: apply to a copy at `base_version` to get `version`.
@@ -50,13 +51,14 @@ struct MapDelta {
   std::uint64_t epoch = 0;
   std::uint64_t base_version = 0;
   std::uint64_t version = 0;
-  std::vector<MapTile> changed;   ///< canonical order
-  std::vector<TileKey> removed;   ///< canonical order
-  MapDigest digest;               ///< of the whole map at `version`
+  std::vector<MapTile> changed;  ///< canonical order
+  std::vector<TileKey> removed;  ///< canonical order
+  MapDigest digest;              ///< of the whole map at `version`
 };
 
 /// Turns the map's dirty blocks into deltas. Holds the compressed tiles (for snapshots and late
-/// joiners) and the running digest. A tile whose quantised content did not change is not sent again.
+/// joiners) and the running digest. A tile whose quantised content did not change is not sent
+/// again.
 class MapPublisher {
  public:
   MapPublisher(std::uint64_t epoch, const TsdfConfig& config);

@@ -16,12 +16,14 @@ struct Mesh {
   std::vector<std::uint32_t> owner;
 };
 
-/// Lorensen and Cline 1987 over every cell whose 8 voxels have weight >= min_weight; vertices shared
-/// between cells are merged, order is canonical (by block key), so equal maps give equal meshes.
+/// Lorensen and Cline 1987 over every cell whose 8 voxels have weight >= min_weight; vertices
+/// shared between cells are merged, order is canonical (by block key), so equal maps give equal
+/// meshes.
 Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool);
 
 /// The same from a copy of the published tiles (what a subscriber holds).
-Mesh extract_mesh(const std::map<TileKey, MapTile>& tiles, double voxel_size_m, double truncation_m);
+Mesh extract_mesh(const std::map<TileKey, MapTile>& tiles, double voxel_size_m,
+                  double truncation_m);
 
 /// Colour (RGB) and class of an object, for files people look at.
 struct OwnerAppearance {

@@ -20,6 +20,7 @@ struct TsdfConfig {
   double truncation_voxels = 4.0;
   double max_depth_m = 3.0;
   int max_weight = 100;
+  int min_publish_weight = 2;
 
   double truncation_m() const { return truncation_voxels * voxel_size_m; }
 
@@ -32,6 +33,8 @@ struct TsdfConfig {
           "Depth beyond which a pixel is not used, theta_depth [m].");
     visit("max_weight", max_weight, Range{1, 1000},
           "Cap of a voxel's weight [observations]: smaller reacts faster, larger averages longer.");
+    visit("min_publish_weight", min_publish_weight, Range{1, 1000},
+          "Weight at which a voxel counts as observed in published tiles [observations].");
   }
 };
 
@@ -57,11 +60,11 @@ class TsdfMap {
 
   const TsdfConfig& config() const;
 
-  /// Fuses one depth image (projective TSDF): allocates the blocks within the truncation band of the
-  /// observed surface, averages the signed distance in every allocated block in view, and carves
-  /// known free space in front of the surface (a voxel that the ray passes through loses its surface
-  /// within a few frames even at full weight). A voxel within the band takes the pixel's owner; a
-  /// block left with free space only is dropped. Bit-identical for every thread count.
+  /// Fuses one depth image (projective TSDF): allocates the blocks within the truncation band of
+  /// the observed surface, averages the signed distance in every allocated block in view, and
+  /// carves known free space in front of the surface (a voxel that the ray passes through loses its
+  /// surface within a few frames even at full weight). A voxel within the band takes the pixel's
+  /// owner; a block left with free space only is dropped. Bit-identical for every thread count.
   void integrate(const IntegrationInput& input, ThreadPool& pool);
 
   /// Resets exactly the voxels owned by `id` to unknown (weight 0, owner 0), drops blocks that end

@@ -1,0 +1,94 @@
+#include "pocd/map/map_delta.hpp"
+
+// Inlined, because the library's version of the algorithm must not change under a digest.
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "bytes.hpp"
+#include "map_digest.hpp"
+#include "tile_codec.hpp"
+
+namespace pocd {
+namespace {
+
+std::vector<TileKey> tiles_of(const std::vector<BlockKey>& blocks) {
+  std::vector<TileKey> tiles;
+  tiles.reserve(blocks.size());
+  for (const BlockKey& key : blocks) tiles.push_back({key.x >> 1, key.y >> 1, key.z >> 1});
+  std::sort(tiles.begin(), tiles.end());
+  tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
+  return tiles;
+}
+
+std::vector<std::uint8_t> encode(const TsdfMap& map, const TileKey& key, int min_weight) {
+  std::array<const VoxelBlock*, 8> blocks;
+  for (int i = 0; i < 8; ++i) {
+    blocks[i] = map.find({2 * key.x + (i & 1), 2 * key.y + (i >> 1 & 1), 2 * key.z + (i >> 2)});
+  }
+  return encode_tile(blocks, min_weight);
+}
+
+}  // namespace
+
+std::string MapDigest::hex() const {
+  char text[33];
+  std::snprintf(text, sizeof text, "%016llx%016llx", static_cast<unsigned long long>(high),
+                static_cast<unsigned long long>(low));
+  return text;
+}
+
+MapDigest tile_digest(const TileKey& key, const std::vector<std::uint8_t>& payload) {
+  std::vector<std::uint8_t> head;
+  for (const std::int32_t c : {key.x, key.y, key.z}) put(head, static_cast<std::uint32_t>(c));
+  XXH3_state_t state;
+  XXH3_INITSTATE(&state);
+  XXH3_128bits_reset(&state);
+  XXH3_128bits_update(&state, head.data(), head.size());
+  XXH3_128bits_update(&state, payload.data(), payload.size());
+  const XXH128_hash_t hash = XXH3_128bits_digest(&state);
+  return {hash.low64, hash.high64};
+}
+
+void add(MapDigest& sum, const MapDigest& term) {
+  sum.low += term.low;
+  sum.high += term.high + (sum.low < term.low ? 1 : 0);
+}
+
+void subtract(MapDigest& sum, const MapDigest& term) {
+  sum.high -= term.high + (sum.low < term.low ? 1 : 0);
+  sum.low -= term.low;
+}
+
+MapPublisher::MapPublisher(std::uint64_t epoch, const TsdfConfig& config)
+    : epoch_(epoch), config_(config) {}
+
+std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
+  MapDelta delta;
+  delta.epoch = epoch_;
+  delta.base_version = version_;
+  delta.version = version_ + 1;
+  for (const TileKey& key : tiles_of(map.take_dirty())) {
+    std::vector<std::uint8_t> payload = encode(map, key, config_.min_publish_weight);
+    const auto known = tiles_.find(key);
+    if (known == tiles_.end() ? payload.empty() : known->second.payload == payload) continue;
+    if (known != tiles_.end()) subtract(digest_, tile_digest(key, known->second.payload));
+    if (payload.empty()) {
+      tiles_.erase(known);
+      delta.removed.push_back(key);
+      continue;
+    }
+    add(digest_, tile_digest(key, payload));
+    MapTile tile{key, delta.version, std::move(payload)};
+    delta.changed.push_back(tile);
+    tiles_[key] = std::move(tile);
+  }
+  if (delta.changed.empty() && delta.removed.empty()) return std::nullopt;
+  version_ = delta.version;
+  delta.digest = digest_;
+  return delta;
+}
+
+}  // namespace pocd
