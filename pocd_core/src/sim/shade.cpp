@@ -9,7 +9,7 @@ namespace pocd {
 namespace {
 
 const Eigen::Vector3f kToLight_W = Eigen::Vector3f(0.35f, 0.25f, 0.9f).normalized();
-constexpr float kAmbient = 0.55f;
+constexpr float kAmbient = 0.72f;
 
 /// 0 on a line of the given spacing, 1 away from it.
 float away_from_line(float x, float spacing, float width) {
@@ -95,7 +95,7 @@ void Shader::shade_row(int v, const float* depth_m, const std::int32_t* part_id,
     const Eigen::Vector3f normal_P = normal_of_hit(*painted.part, p_P, half);
     const float lambert = std::max(0.0f, (painted.R_W_P * normal_P).dot(kToLight_W));
     // Light falls off a little with distance, which gives the picture depth.
-    const float fog = 1.0f / (1.0f + 0.03f * depth_m[u]);
+    const float fog = 1.15f / (1.0f + 0.03f * depth_m[u]);
     const float light = (kAmbient + (1.0f - kAmbient) * lambert) * fog *
                         texture_factor(painted.part->texture, p_P, half, normal_P);
     for (int k = 0; k < 3; ++k) {
