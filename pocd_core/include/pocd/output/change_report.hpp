@@ -1,0 +1,48 @@
+// What really changed in a simulated run beside what the system reported, as a table for people.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/sim/truth.hpp"
+
+namespace pocd {
+
+/// The part of an ObjectEvent that a report needs.
+struct ReportedEvent {
+  EventKind kind = EventKind::kAdded;
+  std::uint32_t object = 0;
+  std::string class_name;
+  Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
+  std::optional<Eigen::Vector3d> previous_W;  ///< MOVED: where it was
+};
+
+/// Reads what EventsCsv wrote, in order. Throws InputError naming file, line and column.
+std::vector<ReportedEvent> read_events_csv(const std::filesystem::path& file);
+
+struct ChangeRow {
+  std::string visit, truth, reported;
+  bool right = false;
+};
+
+/// `rows`: one per object of the first visit and per later change. `false_reports`: ADDED, MOVED
+/// and REMOVED that belong to none of them.
+struct ChangeReport {
+  std::vector<ChangeRow> rows;
+  std::vector<std::string> false_reports;
+  std::size_t changes = 0;        ///< rows after the first visit
+  std::size_t right_changes = 0;  ///< of those
+};
+
+/// Pairs each truth with the first unused event of its kind, in order, whose place is within
+/// `radius_m` horizontally of the true one (MOVED: both places). A move reported as REMOVED and
+/// ADDED is shown, but not right.
+ChangeReport compare_changes(const Scenario& scenario, const std::vector<ReportedEvent>& events,
+                             double radius_m);
+
+std::string format_report(const ChangeReport& report);
+
+}  // namespace pocd

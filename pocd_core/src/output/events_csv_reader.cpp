@@ -1,0 +1,97 @@
+#include <fstream>
+
+#include "pocd/common/check.hpp"
+#include "pocd/output/change_report.hpp"
+
+namespace pocd {
+namespace {
+
+/// The cells of one line; a quoted cell may hold separators and doubled quotes, not line breaks.
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (quoted && c == '"' && i + 1 < line.size() && line[i + 1] == '"') {
+      cells.back() += c;
+      ++i;
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (c == ',' && !quoted) {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  return cells;
+}
+
+class Row {
+ public:
+  Row(const std::vector<std::string>& header, std::vector<std::string> cells, std::string where)
+      : header_(header), cells_(std::move(cells)), where_(std::move(where)) {
+    if (cells_.size() != header_.size()) {
+      throw InputError(where_ + ": " + std::to_string(cells_.size()) + " cells, the header has " +
+                       std::to_string(header_.size()));
+    }
+  }
+
+  const std::string& text(const std::string& column) const {
+    for (std::size_t i = 0; i < header_.size(); ++i) {
+      if (header_[i] == column) return cells_[i];
+    }
+    throw InputError(where_ + ": no column " + column);
+  }
+
+  double number(const std::string& column) const {
+    const std::string& cell = text(column);
+    try {
+      std::size_t used = 0;
+      const double value = std::stod(cell, &used);
+      if (used == cell.size()) return value;
+    } catch (const std::logic_error&) {  // reported below with its place
+    }
+    throw InputError(where_ + ": " + column + " \"" + cell + "\" is no number");
+  }
+
+  Eigen::Vector3d position(const std::string& prefix) const {
+    return {number(prefix + "x"), number(prefix + "y"), number(prefix + "z")};
+  }
+
+  EventKind kind() const {
+    const std::string& word = text("kind");
+    for (const EventKind kind :
+         {EventKind::kAdded, EventKind::kUpdated, EventKind::kMoved, EventKind::kRemoved}) {
+      if (word == to_string(kind)) return kind;
+    }
+    throw InputError(where_ + ": kind \"" + word + "\" is unknown");
+  }
+
+ private:
+  const std::vector<std::string>& header_;
+  std::vector<std::string> cells_;
+  std::string where_;
+};
+
+}  // namespace
+
+std::vector<ReportedEvent> read_events_csv(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  if (!std::getline(in, line)) throw InputError(file.string() + ": cannot be read or is empty");
+  const std::vector<std::string> header = split(line);
+  std::vector<ReportedEvent> events;
+  for (int number = 2; std::getline(in, line); ++number) {
+    const Row row(header, split(line), file.string() + ":" + std::to_string(number));
+    ReportedEvent event;
+    event.kind = row.kind();
+    event.object = static_cast<std::uint32_t>(row.number("object_id"));
+    event.class_name = row.text("class_name");
+    event.position_W = row.position("");
+    if (!row.text("previous_x").empty()) event.previous_W = row.position("previous_");
+    events.push_back(event);
+  }
+  return events;
+}
+
+}  // namespace pocd
