@@ -1,0 +1,184 @@
+#include "map_run.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <ostream>
+
+#include "pocd/common/check.hpp"
+#include "pocd/config/config_io.hpp"
+#include "pocd/map/birdseye.hpp"
+#include "pocd/map/map_delta.hpp"
+#include "pocd/map/mesh.hpp"
+#include "pocd/output/result_csv.hpp"
+#include "pocd/pipeline/pocd_pipeline.hpp"
+
+namespace pocd {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// A line on the terminal that renews itself a few times per second.
+class Progress {
+ public:
+  Progress(bool shown, std::size_t total) : shown_(shown), total_(total) {}
+  ~Progress() {
+    if (shown_) std::fputs("\r\033[K", stderr);
+  }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void update(const RunSummary& summary) {
+    const double now = seconds_since(start_);
+    if (!shown_ || now - last_ < 0.25) return;
+    last_ = now;
+    const std::uint64_t done = summary.frames + summary.skipped;
+    std::fprintf(stderr, "\r\033[Kframe %llu", static_cast<unsigned long long>(done));
+    if (total_ > 0) std::fprintf(stderr, "/%zu", total_);
+    std::fprintf(stderr, "  %.1f frames/s", static_cast<double>(done) / now);
+  }
+  /// Makes room for a line of the log.
+  void clear() const {
+    if (shown_) std::fputs("\r\033[K", stderr);
+  }
+
+ private:
+  bool shown_;
+  std::size_t total_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double last_ = 0.0;
+};
+
+void count(const std::vector<ObjectEvent>& events, RunSummary& summary) {
+  for (const ObjectEvent& event : events) {
+    switch (event.kind) {
+      case EventKind::kAdded:
+        ++summary.added;
+        break;
+      case EventKind::kUpdated:
+        ++summary.updated;
+        break;
+      case EventKind::kMoved:
+        ++summary.moved;
+        break;
+      case EventKind::kRemoved:
+        ++summary.removed;
+        break;
+    }
+  }
+}
+
+void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary,
+                 std::ostream& log) {
+  const std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
+  EventsCsv events(options.output / "events.csv", options.config.classes);
+  TimingCsv timing(options.output / "timing.csv");
+  Progress progress(options.show_progress, reader->size());
+  std::size_t reported = 0;
+  std::size_t unusable = 0;  // read, but no frame that the pipeline takes
+  const auto report = [&](const std::string& line) {
+    progress.clear();
+    log << line << '\n';
+  };
+  while (true) {
+    if ((options.stop && *options.stop) ||
+        (options.max_frames && summary.frames >= *options.max_frames)) {
+      summary.stopped_early = true;
+      break;
+    }
+    const auto read_start = std::chrono::steady_clock::now();
+    const std::optional<Frame> frame = reader->next();
+    const double read_ms = 1e3 * seconds_since(read_start);
+    for (; reported < reader->problems().size(); ++reported) {
+      report("skipped: " + reader->problems()[reported]);
+    }
+    summary.skipped = reader->skipped() + unusable;
+    if (!frame) break;
+
+    FrameResult result;
+    try {
+      result = pipeline.process_frame(*frame);
+    } catch (const InputError& error) {
+      ++unusable;
+      report("skipped: frame " + std::to_string(frame->sequence) + ": " + error.what());
+      continue;
+    }
+    ++summary.frames;
+    if (!result.accepted) ++summary.refused;
+    for (const std::string& warning : result.warnings) {
+      report("frame " + std::to_string(frame->sequence) + ": " + warning);
+    }
+    for (const ObjectEvent& event : result.events) events.add(event);
+    count(result.events, summary);
+    result.timings.insert(result.timings.begin(), {"read", read_ms});
+    timing.add(*frame, result.timings);
+    progress.update(summary);
+  }
+  events.close();
+  timing.close();
+}
+
+/// Objects in the colours of the bird's-eye picture, everything else in the grey of the default.
+AppearanceOf appearance_of(const std::vector<ObjectSnapshot>& objects) {
+  std::map<std::uint32_t, OwnerAppearance> known;
+  for (const ObjectSnapshot& object : objects) {
+    const auto bgr = stationarity_color(object.belief.stationarity());
+    known[to_index(object.id)] = {{bgr[2], bgr[1], bgr[0]}, object.class_id};
+  }
+  return [known](std::uint32_t owner) {
+    const auto it = known.find(owner);
+    return it == known.end() ? OwnerAppearance{} : it->second;
+  };
+}
+
+void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary) {
+  MapPublisher publisher(1, options.config.map);
+  publisher.update(pipeline.map());
+  summary.map_digest = publisher.digest().hex();
+  summary.map_blocks = pipeline.map().block_count();
+  const Mesh mesh = extract_mesh(publisher.tiles(), options.config.map.voxel_size_m,
+                                 options.config.map.truncation_m());
+  const std::vector<ObjectSnapshot> objects = pipeline.objects();
+  summary.objects = objects.size();
+  write_objects_csv(objects, options.config.classes, options.output / "objects.csv");
+  write_ply(mesh, appearance_of(objects), options.output / "map.ply");
+  write_birdseye(mesh, objects, options.output / "birdseye.png");
+}
+
+void write_summary(const RunSummary& summary, const std::filesystem::path& file) {
+  std::ofstream out(file, std::ios::binary);
+  out << dump_config(summary);
+  out.close();
+  if (!out) throw InputError(file.string() + ": cannot be written in full");
+}
+
+}  // namespace
+
+RunSummary run_map(const MapRunOptions& options, std::ostream& log) {
+  std::error_code error;
+  std::filesystem::create_directories(options.output, error);
+  if (error) throw InputError(options.output.string() + ": cannot be made: " + error.message());
+
+  RunSummary summary;
+  summary.version = POCD_VERSION;
+  summary.dataset = options.dataset.format;
+  for (const auto& input : options.dataset.inputs) summary.inputs.push_back(input.string());
+  summary.config = options.config;
+
+  const auto start = std::chrono::steady_clock::now();
+  PocdPipeline pipeline(options.config);
+  process_all(options, pipeline, summary, log);
+  summary.seconds = seconds_since(start);
+  if (summary.frames == 0 && !summary.stopped_early) {
+    throw InputError("no good frame in the inputs (" + std::to_string(summary.skipped) +
+                     " skipped)");
+  }
+  write_map(options, pipeline, summary);
+  write_summary(summary, options.output / "summary.yaml");
+  return summary;
+}
+
+}  // namespace pocd

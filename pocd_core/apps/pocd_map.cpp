@@ -1,0 +1,81 @@
+// The offline command: frames from files, no bus, the same bytes out for the same bytes in.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <iostream>
+
+#include "map_run.hpp"
+#include "pocd/common/check.hpp"
+#include "pocd/config/config_io.hpp"
+#include "pocd/config/dataset_options_cli.hpp"
+
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+/// The first signal asks for an orderly end, a second one ends the process as usual.
+void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+void print(const pocd::RunSummary& s, const std::filesystem::path& output) {
+  std::cout << s.frames << " frames" << (s.stopped_early ? " (stopped early)" : "") << ", "
+            << s.skipped << " skipped, " << s.refused << " refused; " << s.objects << " objects; "
+            << s.added << " added, " << s.moved << " moved, " << s.removed << " removed; map "
+            << s.map_digest << "\nresults in " << output.string() << '\n';
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Maps a recorded or simulated data set and lists what changed.\n"
+      "Example: pocd_map --dataset sim --input config/sim/demo.yaml --config config/simulated.yaml "
+      "--output output/demo\n"
+      "Exit code: 0 done (bad frames are skipped and counted), 1 inputs or outputs unusable, 2 "
+      "usage or configuration.",
+      "pocd_map");
+  pocd::MapRunOptions options;
+  std::vector<std::filesystem::path> files;
+  std::vector<std::string> overrides;
+  app.set_version_flag("--version", POCD_VERSION);
+  pocd::add_dataset_options(app, options.dataset);
+  app.add_option("--config", files, "Configuration file; repeat it to overlay several")
+      ->required()
+      ->allow_extra_args(false);
+  app.add_option("--set", overrides, "Override one parameter: GROUP.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option_function<std::string>(
+      "--threads", [&](const std::string& n) { overrides.push_back("threads=" + n); },
+      "Threads; results do not depend on it");
+  app.add_option("--output", options.output, "Folder for the results, made if missing")->required();
+  app.add_option("--max-frames", options.max_frames, "Stop after that many good frames")
+      ->check(CLI::Range(1, 1000000000));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    pocd::load_config(options.config, files, overrides);
+  } catch (const pocd::InputError& error) {
+    std::cerr << "pocd_map: " << error.what() << '\n';
+    return 2;
+  }
+  try {
+    stop_on_signals();
+    options.stop = &stop_requested;
+    options.show_progress = isatty(STDERR_FILENO) != 0;
+    options.dataset.label_divisor = options.config.classes.label_divisor;
+    print(pocd::run_map(options, std::cerr), options.output);
+    return std::cout.flush() ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::cerr << "pocd_map: " << error.what() << '\n';
+    return 1;
+  }
+}
