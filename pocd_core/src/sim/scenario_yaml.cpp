@@ -129,7 +129,11 @@ void apply_move(YamlFields& fields, std::vector<SceneObject>& objects) {
           Eigen::AngleAxisd(kDegree * step.z(), Eigen::Vector3d::UnitZ()) * object.T_W_O.linear();
       object.T_W_O.translation() += Eigen::Vector3d(step.x(), step.y(), 0.0);
     } else {
-      object.T_W_O = upright_pose({step.x(), step.y(), from.z()}, kDegree * step.z());
+      // Keeps height and lean: only the upright frame under the object moves.
+      const Eigen::Matrix3d& R = object.T_W_O.linear();
+      const Pose T_W_H = upright_pose({from.x(), from.y(), 0.0}, std::atan2(R(1, 0), R(0, 0)));
+      object.T_W_O = upright_pose({step.x(), step.y(), 0.0}, kDegree * step.z()) *
+                     (T_W_H.inverse() * object.T_W_O);
     }
   }
 }
