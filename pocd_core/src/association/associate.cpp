@@ -24,7 +24,35 @@ const Sighting::Touch* find_touch(const Sighting& sighting, std::int32_t observa
   return nullptr;
 }
 
-bool in_doubt(const Sighting& s) { return s.visible() >= kMinVisible && s.seen_through_share() > kMajority; }
+/// An object that is seen through by this share while its observation fits by less than kMismatchFit is
+/// in doubt: it turned, or something else took part of its place. Borders under pose error stay below.
+constexpr double kMismatchShare = 0.25;
+constexpr double kMismatchFit = 0.75;
+/// The same when its own observation covers it from the front; since an unseen part of an object may
+/// do that too, the object must be in view almost whole, and fit worse.
+constexpr double kCoveredWhole = 0.7;
+constexpr double kCoveredFit = 0.5;
+
+bool in_doubt(const Candidate& candidate, const Observations& observations) {
+  const Sighting& s = candidate.sighting;
+  const ObjectModel& model = candidate.object->model;
+  if (s.visible() >= kMinVisible && s.seen_through_share() > kMajority) return true;
+  int covered = 0;
+  double fit = 0.0;
+  const int suspects = s.seen_through + s.occluded;
+  if (suspects < kMinVisible || suspects < kMismatchShare * (s.visible() + s.occluded)) return false;
+  for (const auto& touch : s.touches) {
+    const Observation& observation = observations.list[touch.observation];
+    if (observation.class_id != candidate.object->class_id || touch.hit == 0) continue;
+    covered = std::max(covered, touch.in_front);
+    fit = std::max(fit, model.explained_share(observation.points, static_cast<float>(1.5 * model.spacing_m()),
+                                              kShareBudget));
+  }
+  if (s.visible() >= kMinVisible && s.seen_through_share() > kMismatchShare) return fit < kMismatchFit;
+  const int seen = s.visible() + covered;
+  return fit < kCoveredFit && seen >= kCoveredWhole * s.total &&
+         s.seen_through + covered > kMismatchShare * seen;
+}
 
 std::shared_ptr<const IcpTarget> target_of(LibraryObject& object, double max_distance_m) {
   if (!object.icp_target) {
@@ -94,13 +122,14 @@ AssociationResult associate(const Candidate* candidates, std::size_t count,
   for (std::size_t c = 0; c < count; ++c) {
     LibraryObject& object = *candidates[c].object;
     const Sighting& sighting = candidates[c].sighting;
-    const bool doubtful = in_doubt(sighting);
+    const double spacing = object.model.spacing_m();
+    const bool doubtful = in_doubt(candidates[c], observations);
+    result.doubtful.push_back(doubtful);
     for (std::size_t j = 0; j < observations.list.size(); ++j) {
       const Observation& observation = observations.list[j];
       const double class_cost = observation.class_id == object.class_id ? 0.0 : config.lambda_class;
       if (class_cost > config.cutoff_cost) continue;
       const double distance = (object.box.pose.position_W - observation.box.pose.position_W).norm();
-      const double spacing = object.model.spacing_m();
       const bool overlapping = box_overlap(object.box, observation.box, 4.0 * spacing) > 0.0;
       if (distance >= config.max_distance_m && !overlapping) continue;
 

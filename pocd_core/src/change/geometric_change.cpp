@@ -31,7 +31,7 @@ double geometric_change(const LibraryObject& object, const Observation& observat
     options.voxel_size_m = object.model.spacing_m();
     options.truncation_m = config.tsdf_truncation_m;
     options.lambda_diff = config.lambda_diff;
-    const auto change = ray_traced_change(object_C, observation_C, match.sign, options);
+    const auto change = ray_traced_change(object_C, observation_C, -match.sign, options);
     delta_m = change ? change->delta_m : match.sign * match.displacement_m;
   } else {
     delta_m = match.stationary ? projective(sighting) : match.sign * match.displacement_m;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pocd/common/check.hpp"
+
 namespace pocd {
 namespace {
 
@@ -28,6 +30,18 @@ const LibraryObject* ObjectLibrary::find(ObjectId id) const {
 void ObjectLibrary::erase(ObjectId id) {
   unfile(id);
   objects_.erase(id);
+}
+
+void ObjectLibrary::rename(ObjectId from, ObjectId to) {
+  POCD_CHECK(find(to) == nullptr);
+  const auto it = objects_.find(from);
+  POCD_CHECK(it != objects_.end());
+  unfile(from);
+  std::unique_ptr<LibraryObject> object = std::move(it->second);
+  objects_.erase(it);
+  object->id = to;
+  LibraryObject& moved = *objects_.emplace(to, std::move(object)).first->second;
+  place(moved, moved.box);
 }
 
 void ObjectLibrary::unfile(ObjectId id) {
@@ -83,6 +97,7 @@ ObjectSnapshot snapshot(const LibraryObject& object) {
   s.class_id = object.class_id;
   s.stationarity_class = object.stationarity_class;
   s.box = object.box;
+  s.centroid_W = object.centroid_W;
   s.belief = object.belief;
   s.first_seen_ns = object.first_seen_ns;
   s.last_seen_ns = object.last_seen_ns;

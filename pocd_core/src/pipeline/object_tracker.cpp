@@ -13,8 +13,8 @@ namespace {
 constexpr double kMajority = 0.5;
 /// Points of an established object must have been measured in this many frames to bear witness.
 constexpr int kEstablishedHits = 2;
-/// How long the report of a new object waits for a like one that is in doubt [frames].
-constexpr std::uint32_t kWaitForDoubt = 12;
+/// A known object slid along itself when it lost and gained at least this share of its points.
+constexpr double kSlidShare = 0.12;
 
 }  // namespace
 
@@ -32,13 +32,15 @@ struct ObjectTracker::Step {
   AssociationResult association;
   /// Evidence of this frame's measurement, by object.
   std::map<ObjectId, Evidence> evidence;
+  /// Observations that look like an object that has moved.
+  std::map<std::int32_t, ObjectId> moved_from;
 };
 
 void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, const DepthField& field,
                            const Observations& observations, const GroundModel& ground, TsdfMap& map,
                            std::vector<std::uint32_t>& owner_of_observation, FrameResult& result) {
   owner_of_observation.assign(observations.list.size(), IntegrationInput::kSkip);
-  Step step{frame, cloud, field, observations, ground, map, owner_of_observation, result, 0, {}, {}, {}};
+  Step step{frame, cloud, field, observations, ground, map, owner_of_observation, result, 0, {}, {}, {}, {}};
   find_candidates(step);
   step.association =
       associate(candidates_.data(), step.candidate_count, observations, cloud.T_W_C, config_.association);
@@ -86,11 +88,12 @@ void ObjectTracker::update_matched(Step& step) {
         geometric_change(object, observation, sighting, match, step.cloud, config_.change);
     step.evidence[object.id] = apply_measurement(object, delta_m, sighting, config_.state, config_.change);
     mark_changed(object);
-    if (match.stationary && std::abs(delta_m) <= verified_m) {
+    if (match.displacement_m <= verified_m && std::abs(delta_m) <= verified_m) {
       fuse(step, object, match.observation);
       step.owner_of_observation[match.observation] = to_index(object.id);
-    } else if (!match.stationary && match.displacement_m > verified_m) {
+    } else if (match.displacement_m > verified_m) {
       // Discarded as evidence of this object; it may be where the object is now.
+      step.moved_from[match.observation] = object.id;
       step.association.unassigned.push_back(match.observation);
     }
   }
@@ -110,7 +113,7 @@ void ObjectTracker::update_unmatched(Step& step) {
     const Sighting& sighting = candidates_[c].sighting;
     if (sighting.visible_share() < config_.association.min_visible_share) continue;
     if (!object.confirmed) ++object.frames_in_view;
-    if (sighting.seen_through_share() <= kMajority) continue;
+    if (!step.association.doubtful[c]) continue;
     ++object.frames_seen_through;
     step.evidence[object.id] =
         apply_measurement(object, config_.change.delta_max_m, sighting, config_.state, config_.change);
@@ -128,9 +131,10 @@ void ObjectTracker::erode(Step& step) {
       if (sights[i] == Sight::kSeenThrough && surfels[i].seen_through < 255) ++surfels[i].seen_through;
       if (sights[i] == Sight::kHit) surfels[i].seen_through = 0;
     }
-    if (object.model.erode(config_.state.erode_frames) > 0) {
+    if (const int lost = object.model.erode(config_.state.erode_frames); lost > 0) {
       object.icp_target.reset();
-      object.shrank = true;
+      object.lost += static_cast<std::size_t>(lost);
+      mark_changed(object);
       if (!object.model.surfels().empty()) refit_box(step, object);
     }
   }
@@ -138,7 +142,7 @@ void ObjectTracker::erode(Step& step) {
 
 void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) {
   const Observation& observation = step.observations.list[index];
-  if (object.model.fuse(observation.points) > 0) object.grew = true;
+  object.gained += static_cast<std::size_t>(object.model.fuse(observation.points));
   object.icp_target.reset();
   ++object.observations;
   object.last_seen_ns = step.frame.stamp_ns;
@@ -158,6 +162,9 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
     if (s.hits >= min_hits && s.seen_through < 3) points.push_back(s.point_W);
   }
   if (points.size() < 3) return;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& p : points) sum += p.cast<double>();
+  object.centroid_W = sum / static_cast<double>(points.size());
   OrientedBox box = fit_box(points, 0.005);
   // The ground band was cut off: what stands on the ground reaches it.
   if (step.ground.known()) {
@@ -186,6 +193,8 @@ void ObjectTracker::add_new(Step& step) {
     object.belief.alpha = config_.state.initial_stationarity * config_.state.initial_count;
     object.belief.beta = (1.0 - config_.state.initial_stationarity) * config_.state.initial_count;
     object.first_seen_ns = step.frame.stamp_ns;
+    const auto origin = step.moved_from.find(index);
+    if (origin != step.moved_from.end()) object.moved_from = origin->second;
     fuse(step, object, index);
     object.frames_in_view = 1;
     step.owner_of_observation[index] = to_index(object.id);
@@ -225,7 +234,6 @@ void ObjectTracker::join_companions(Step& step) {
     survivor->most_surfels = std::max(survivor->most_surfels, survivor->model.surfels().size());
     survivor->observations += absorbed->observations;
     survivor->companions.clear();
-    survivor->grew = true;
     mark_changed(*survivor);
     step.map.reassign_object(absorbed_id, survivor_id);
     for (auto& owner : step.owner_of_observation) {
@@ -274,22 +282,54 @@ ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryO
 void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   object.confirmed = true;
   object.reported_box = object.box;
-  object.grew = object.shrank = false;
-  mark_changed(object);
+  object.gained = object.lost = 0;
   const auto removed = relocations_.take(object.class_id, object.box, step.frame.stamp_ns,
                                          config_.state.relocation_window_s, like_size_slack_m());
-  if (removed) {
-    ObjectEvent& event = add_event(step, EventKind::kMoved, object,
-                                   "relocated_from_" + std::to_string(to_index(removed->id)));
-    event.previous_box = removed->box;
-  } else {
+  if (!removed) {
+    mark_changed(object);
     add_event(step, EventKind::kAdded, object, "confirmed");
+    return;
   }
+  take_identity(step, object, removed->id, removed->first_seen_ns);
+  add_event(step, EventKind::kMoved, object, "found_again").previous_box = removed->box;
+}
+
+void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns) {
+  const ObjectId old = object.id;
+  step.map.reassign_object(old, id);
+  for (auto& owner : step.owner_of_observation) {
+    if (owner == to_index(old)) owner = to_index(id);
+  }
+  if (const auto it = step.evidence.find(old); it != step.evidence.end()) step.evidence[id] = it->second;
+  library_.rename(old, id);
+  object.first_seen_ns = first_seen_ns;
+  object.changed = false;  // it was listed under its old id
+  mark_changed(object);
+}
+
+LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject& object) {
+  LibraryObject* best = nullptr;
+  double best_distance = 0.0;
+  for (const ObjectId id : step.in_view) {
+    LibraryObject* other = library_.find(id);
+    if (!other || other->confirmed || other->class_id != object.class_id || other->observations < 2 ||
+        other->last_seen_ns != step.frame.stamp_ns || !alike(other->box, object.box, like_size_slack_m())) {
+      continue;
+    }
+    const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
+    const bool named = other->moved_from == object.id, best_named = best && best->moved_from == object.id;
+    if (!best || (named && !best_named) || (named == best_named && distance < best_distance)) {
+      best = other;
+      best_distance = distance;
+    }
+  }
+  return best;
 }
 
 void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule) {
-  const LibraryObject& object = *library_.find(id);
-  if (object.confirmed) {
+  LibraryObject& object = *library_.find(id);
+  LibraryObject* successor = object.confirmed ? new_place_of(step, object) : nullptr;
+  if (object.confirmed && !successor) {
     add_event(step, EventKind::kRemoved, object, rule);
     step.result.retired.push_back(id);
     relocations_.remember({id, object.class_id, object.box, object.first_seen_ns, step.frame.stamp_ns});
@@ -298,7 +338,17 @@ void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule) {
   for (auto& owner : step.owner_of_observation) {
     if (owner == to_index(id)) owner = IntegrationInput::kSkip;
   }
+  const OrientedBox previous_box = object.box;
+  const StampNs first_seen_ns = object.first_seen_ns;
   library_.erase(id);
+  if (!successor) return;
+  const Evidence evidence = step.evidence[id];
+  take_identity(step, *successor, id, first_seen_ns);
+  successor->confirmed = true;
+  successor->reported_box = successor->box;
+  successor->gained = successor->lost = 0;
+  step.evidence[id] = evidence;
+  add_event(step, EventKind::kMoved, *successor, rule).previous_box = previous_box;
 }
 
 void ObjectTracker::remove_or_confirm(Step& step) {
@@ -308,12 +358,16 @@ void ObjectTracker::remove_or_confirm(Step& step) {
     if (!object) continue;
     if (const auto rule = removal_rule(*object, config_.state, config_.change)) to_remove.emplace_back(id, *rule);
   }
-  for (const auto& [id, rule] : to_remove) remove(step, id, rule);
+  for (const auto& [id, rule] : to_remove) {
+    if (library_.find(id)) remove(step, id, rule);
+  }
 
+  const auto needed = static_cast<std::uint32_t>(config_.state.confirm_observations);
+  const auto wait = static_cast<std::uint32_t>(config_.state.wait_for_doubt_frames);
   std::vector<LibraryObject*> ready;
   for (const auto owner : step.owner_of_observation) {
     LibraryObject* object = owner == IntegrationInput::kSkip ? nullptr : library_.find(ObjectId{owner});
-    if (!object || object->confirmed || object->observations < static_cast<std::uint32_t>(config_.state.confirm_observations)) continue;
+    if (!object || object->confirmed || object->observations < needed) continue;
     if (std::find(ready.begin(), ready.end(), object) == ready.end()) ready.push_back(object);
   }
   std::sort(ready.begin(), ready.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
@@ -321,10 +375,11 @@ void ObjectTracker::remove_or_confirm(Step& step) {
     bool doubt = false;
     for (const ObjectId id : step.in_view) {
       const LibraryObject* other = library_.find(id);
-      doubt = doubt || (other && other != object && other->confirmed && other->class_id == object->class_id &&
-                        other->frames_seen_through > 0 && alike(other->box, object->box, like_size_slack_m()));
+      if (!other || other == object || !other->confirmed || other->class_id != object->class_id) continue;
+      doubt = doubt || object->moved_from == id ||
+              (other->frames_seen_through > 0 && alike(other->box, object->box, like_size_slack_m()));
     }
-    if (doubt && object->observations < static_cast<std::uint32_t>(config_.state.confirm_observations) + kWaitForDoubt) continue;
+    if (doubt && object->observations < needed + wait) continue;
     confirm(step, *object);
   }
 }
@@ -344,17 +399,18 @@ void ObjectTracker::report_changes(Step& step) {
     const double growth = (object->box.size_m - object->reported_box.size_m).cwiseAbs().maxCoeff();
     const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
     // Lost points at one end and gained as many at the other: it slid along itself.
-    if (object->grew && object->shrank && shift_m > notable_m &&
-        alike(object->box, object->reported_box, like_size_slack_m())) {
+    const double least = kSlidShare * static_cast<double>(object->model.surfels().size());
+    if (static_cast<double>(object->lost) > least && static_cast<double>(object->gained) > least &&
+        shift_m > notable_m && growth < notable_m) {
       ObjectEvent& event = add_event(step, EventKind::kMoved, *object, "slid");
       event.previous_box = object->reported_box;
     } else if (shift_m > notable_m || growth > notable_m) {
-      add_event(step, EventKind::kUpdated, *object, object->shrank ? "part_removed" : "grew");
+      add_event(step, EventKind::kUpdated, *object, object->lost > object->gained ? "part_removed" : "grew");
     } else {
       continue;
     }
     object->reported_box = object->box;
-    object->grew = object->shrank = false;
+    object->gained = object->lost = 0;
   }
   for (const LibraryObject* object : touched) step.result.changed_objects.push_back(snapshot(*object));
   std::sort(step.result.retired.begin(), step.result.retired.end());

@@ -41,6 +41,10 @@ class ObjectTracker {
 
   void fuse(Step& step, LibraryObject& object, std::int32_t observation);
   void refit_box(Step& step, LibraryObject& object);
+  /// Makes a new object the continuation of a known one: id, voxels, history.
+  void take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns);
+  /// The tentative object in view that is most likely this one, moved; or null.
+  LibraryObject* new_place_of(const Step& step, const LibraryObject& object);
   void mark_changed(LibraryObject& object);
   void confirm(Step& step, LibraryObject& object);
   void remove(Step& step, ObjectId id, const std::string& rule);

@@ -21,7 +21,7 @@ Belief next_belief(const Belief& before, double delta_m, int stationarity_class,
   Belief after = bayesian_update(before, measurement, change.delta_max_m).belief;
   if (after.stationarity() > state.max_stationarity) return before;
   after = clamp_counts(after, state.max_count);
-  after.sigma = std::max(after.sigma, state.min_sigma_m);
+  after.sigma = std::max(after.sigma, state.min_sigma_share * change.tau_m);
   return after;
 }
 

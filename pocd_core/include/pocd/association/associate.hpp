@@ -37,6 +37,9 @@ struct AssociationResult {
   };
   std::vector<Piece> pieces;
   std::vector<std::int32_t> unassigned;  ///< observations of no known object, ascending
+  /// Per candidate: most of what is visible of it is seen through, or a good part is while the
+  /// observations near it do not fit it either.
+  std::vector<bool> doubtful;
 };
 
 /// Pairs within the gates (class, centroid distance or overlapping boxes). An object that most of its

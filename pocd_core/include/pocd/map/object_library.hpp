@@ -22,6 +22,7 @@ struct LibraryObject {
   bool confirmed = false;  ///< false: tentative, known to nobody outside
   ObjectModel model;
   OrientedBox box;
+  Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();  ///< mean of the surface
   Belief belief;
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;
@@ -30,8 +31,9 @@ struct LibraryObject {
   int frames_in_view = 0;        ///< tentative only
   int frames_seen_through = 0;   ///< in a row
   OrientedBox reported_box;      ///< as in the last event
-  bool grew = false;             ///< gained points since the last event
-  bool shrank = false;           ///< lost points since the last event
+  std::size_t gained = 0;        ///< points since the last event
+  std::size_t lost = 0;          ///< points since the last event
+  ObjectId moved_from = ObjectId::kNone;  ///< tentative: the object that it may be, elsewhere
   bool changed = false;          ///< since the last FrameResult
   std::size_t box_surfels = 0;   ///< size of the model when the box was fitted
   std::size_t most_surfels = 0;
@@ -49,6 +51,8 @@ class ObjectLibrary {
   LibraryObject* find(ObjectId id);
   const LibraryObject* find(ObjectId id) const;
   void erase(ObjectId id);
+  /// Gives the object another id, which must be free. Pointers to it stay valid.
+  void rename(ObjectId from, ObjectId to);
 
   /// Sets the box and files the object where it lies.
   void place(LibraryObject& object, const OrientedBox& box);

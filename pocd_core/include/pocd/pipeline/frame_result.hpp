@@ -16,6 +16,7 @@ struct ObjectSnapshot {
   ClassId class_id = 0;
   int stationarity_class = 0;  ///< s: 0 movable, 1 static
   OrientedBox box;             ///< map frame
+  Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();  ///< mean of the mapped surface points [m]
   Belief belief;
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;

@@ -11,12 +11,13 @@ struct StateConfig {
   double initial_sigma_m = 0.5;
   double max_stationarity = 0.9999;
   double max_count = 12.0;
-  double min_sigma_m = 0.1;
+  double min_sigma_share = 0.5;
   double remove_below = 0.4;
   double k = 3.0;
   int confirm_observations = 3;
   int tentative_frames = 15;
-  int erode_frames = 8;
+  int erode_frames = 5;
+  int wait_for_doubt_frames = 12;
   int merge_frames = 10;
   double relocation_window_s = 60.0;
 
@@ -29,8 +30,8 @@ struct StateConfig {
           "An update that would raise E[v] above this is not applied, v_max.");
     visit("max_count", max_count, Range{1.0, 1e6},
           "Cap of alpha + beta: how much past evidence an object can hold against new evidence.");
-    visit("min_sigma_m", min_sigma_m, Range{0.0, 10.0},
-          "Floor of sigma: how far past measurements can fix the believed change [m].");
+    visit("min_sigma_share", min_sigma_share, Range{0.0, 10.0},
+          "Floor of sigma as a share of tau: how far past measurements can fix the believed change.");
     visit("remove_below", remove_below, Range{0.0, 1.0},
           "Objects with E[v] below this are removed from library and map, theta_stat.");
     visit("k", k, Range{0.0, 100.0},
@@ -42,6 +43,9 @@ struct StateConfig {
           "A new object that is in view this many frames without being confirmed is forgotten [frames].");
     visit("erode_frames", erode_frames, Range{1, 1000},
           "A point of an object that is seen through in this many frames in a row is dropped [frames].");
+    visit("wait_for_doubt_frames", wait_for_doubt_frames, Range{0, 100000},
+          "How much longer the report of a new object waits while a like one is seen through: both are "
+          "one MOVED then [frames].");
     visit("merge_frames", merge_frames, Range{1, 100000},
           "Objects of one class that share an observation in this many frames are one [frames].");
     visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
