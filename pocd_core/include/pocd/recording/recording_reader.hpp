@@ -1,0 +1,94 @@
+// Messages from a recording, whoever wrote it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace pocd::recording {
+
+struct RecordedChannel {
+  std::string topic;             ///< ROS topics begin with "/" and not with "rt/"
+  std::string type;              ///< name of the schema: "sensor_msgs/msg/Image"
+  std::string message_encoding;  ///< "cdr"
+  std::string schema_encoding;   ///< "ros2msg", "omgidl", ...; "" when there is no schema
+  std::string schema;            ///< its text
+  std::map<std::string, std::string> metadata;
+  std::uint64_t messages = 0;    ///< as the file says, or as found by reading it through
+};
+
+struct RecordedMessage {
+  std::size_t channel = 0;  ///< index into channels()
+  std::uint32_t sequence = 0;
+  std::uint64_t log_time_ns = 0;
+  std::uint64_t publish_time_ns = 0;
+  const std::uint8_t* data = nullptr;  ///< valid until the next call of the reader
+  std::size_t size = 0;
+};
+
+/// What the whole file is said (or was found) to hold.
+struct RecordingInfo {
+  std::string format;   ///< "mcap", "db3"
+  std::string profile;  ///< "ros2" or ""
+  std::string library;  ///< what wrote it, as it says
+  std::uint64_t bytes = 0;
+  std::uint64_t messages = 0;
+  std::uint64_t chunks = 0;
+  std::uint64_t start_ns = 0, end_ns = 0;  ///< log times of the first and last message
+  std::map<std::string, std::uint64_t> chunks_by_compression;
+  bool recovered = false;  ///< no usable index: read through from the start
+};
+
+/// Not thread-safe. Damage is not an exception: what can be read is read, and problems() says what
+/// could not, with the offset.
+class RecordingReader {
+ public:
+  virtual ~RecordingReader() = default;
+
+  virtual const RecordingInfo& info() const = 0;
+  virtual const std::vector<RecordedChannel>& channels() const = 0;
+  /// Next message in the order of log times (equal ones in the order of the file); false at the end.
+  virtual bool next(RecordedMessage& message) = 0;
+  /// Goes on with the first message at or after the log time; 0 is the start.
+  virtual void seek(std::uint64_t log_time_ns) = 0;
+  /// Leaves out other channels from now on; call it before next() or seek().
+  void select(std::function<bool(const RecordedChannel&)> wanted) { wanted_ = std::move(wanted); }
+
+  /// One line each: file, offset, what is wrong. At most kMostProblems; problem_count() is not bounded.
+  const std::vector<std::string>& problems() const { return problems_; }
+  std::uint64_t problem_count() const { return problem_count_; }
+  static constexpr std::size_t kMostProblems = 100;
+
+ protected:
+  bool wanted(const RecordedChannel& channel) const { return !wanted_ || wanted_(channel); }
+  void add_problem(const std::string& problem) {
+    ++problem_count_;
+    if (problems_.size() < kMostProblems) problems_.push_back(problem);
+  }
+
+ private:
+  std::function<bool(const RecordedChannel&)> wanted_;
+  std::vector<std::string> problems_;
+  std::uint64_t problem_count_ = 0;
+};
+
+struct ReaderLimits {
+  std::uint64_t chunk_bytes = 256u << 20;   ///< a larger chunk or message is not read
+  std::uint64_t loaded_bytes = 1024u << 20; ///< chunks that overlap in time, held at once
+};
+
+/// By what the file begins with: MCAP, or SQLite for rosbag2's .db3. Throws InputError naming the file
+/// when it cannot be read at all or is neither.
+std::unique_ptr<RecordingReader> open_recording(const std::filesystem::path& file,
+                                                const ReaderLimits& limits = {});
+
+/// The recordings that `input` stands for: itself, or the .mcap and .db3 files of a folder in the
+/// order of their names (numbers by value). Throws InputError when there are none.
+std::vector<std::filesystem::path> recording_files(const std::filesystem::path& input);
+
+}  // namespace pocd::recording
