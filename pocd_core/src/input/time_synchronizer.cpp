@@ -159,6 +159,16 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
   return frames;
 }
 
+void TimeSynchronizer::restart() {
+  POCD_CHECK(depth_.empty());
+  counts_.unmatched_images += segmentation_.size() + color_.size();
+  segmentation_.clear();
+  color_.clear();
+  infos_.clear();
+  newest_ns_.clear();
+  horizon_ns_ = watermark_ns_ = std::numeric_limits<StampNs>::min();
+}
+
 std::vector<SyncedFrame> TimeSynchronizer::take() { return run(false); }
 std::vector<SyncedFrame> TimeSynchronizer::flush() { return run(true); }
 

@@ -1,5 +1,7 @@
 #include "pocd/input/transform_tree.hpp"
 
+#include <iterator>
+
 namespace pocd {
 
 TransformTree::TransformTree(StampNs max_gap_ns, std::size_t capacity)
@@ -17,6 +19,12 @@ bool TransformTree::add(const std::string& parent, const std::string& child, Sta
     edge = edges_.insert_or_assign(child, Edge{parent, false, {}, {max_gap_ns_, capacity_}}).first;
   }
   return edge->second.buffer.add(stamp_ns, T);
+}
+
+void TransformTree::forget_moving() {
+  for (auto edge = edges_.begin(); edge != edges_.end();) {
+    edge = edge->second.is_static ? std::next(edge) : edges_.erase(edge);
+  }
 }
 
 TransformLookup TransformTree::lookup(const std::string& target, const std::string& source,

@@ -79,10 +79,16 @@ class TimeSynchronizer {
   /// streams run ahead.
   void set_patient(bool patient) { patient_ = patient; }
 
+  /// Frame of the depth camera in the transforms, when only the first image tells.
+  void set_camera_frame(const std::string& frame) { config_.camera_frame = frame; }
+
   /// Frames that are ready, by stamp.
   std::vector<SyncedFrame> take();
   /// The same, when nothing more will come: whatever a frame lacks is missing.
   std::vector<SyncedFrame> flush();
+
+  /// The source has gone: the next one may start at any stamp. Nothing may be pending.
+  void restart();
 
   std::size_t pending() const { return depth_.size(); }
   /// No frame with this stamp or an earlier one will come out any more.

@@ -29,6 +29,9 @@ class TransformTree {
   bool add(const std::string& parent, const std::string& child, StampNs stamp_ns,
            const PoseQuaternion& T);
 
+  /// Forgets everything that is not static.
+  void forget_moving();
+
   /// T_target_source at the stamp; `target` must be an ancestor of `source` (or the same frame).
   /// kEmpty: no chain of parents leads from source to target; `edge` names the frame where it ends.
   TransformLookup lookup(const std::string& target, const std::string& source, StampNs stamp_ns,

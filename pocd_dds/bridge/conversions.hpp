@@ -1,0 +1,109 @@
+// Between messages and the core's types: the only place that knows both.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry_msgs.h"
+#include "nav_msgs.h"
+#include "pocd/input/camera_model.hpp"
+#include "pocd/input/pose_quaternion.hpp"
+#include "pocd/map/map_delta.hpp"
+#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/segmentation/class_map.hpp"
+#include "pocd_dds/bridge/input_problem.hpp"
+#include "pocd_msgs.h"
+#include "sensor_msgs.h"
+#include "tf2_msgs.h"
+
+namespace pocd::dds {
+
+StampNs to_stamp(const builtin_interfaces::msg::Time& time);
+builtin_interfaces::msg::Time to_time(StampNs stamp_ns);
+
+// ---- input ----
+
+/// 16UC1 and mono16 (millimetres) as CV_16UC1, 32FC1 (metres) as CV_32FC1; a copy.
+Checked<cv::Mat> depth_from(const sensor_msgs::msg::Image& image);
+/// rgb8 and bgr8 as CV_8UC3 BGR; a copy.
+Checked<cv::Mat> color_from(const sensor_msgs::msg::Image& image);
+
+/// Colours of a class map, for masks that are coloured.
+class ColourTable {
+ public:
+  /// Throws InputError naming the class whose rgb is not "r,g,b" with values in 0 to 255, or is
+  /// taken.
+  explicit ColourTable(const ClassMap& classes);
+  /// Pixel value of the label image; -1 for a colour of no class.
+  int value(std::uint8_t r, std::uint8_t g, std::uint8_t b) const;
+
+ private:
+  std::map<std::uint32_t, int> values_;
+};
+
+struct LabelImage {
+  cv::Mat labels;                    ///< CV_16UC1
+  std::uint64_t unknown_pixels = 0;  ///< colours of no class: they became class 0
+};
+/// mono8, mono16 (also 8UC1, 16UC1): class indices. rgb8, bgr8: by colour. A copy.
+Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& image, const ColourTable& colours);
+
+Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info);
+
+/// A transform parent -> child at a stamp, from odometry or tf.
+struct StampedTransform {
+  std::string parent, child;
+  StampNs stamp_ns = 0;
+  PoseQuaternion T;
+};
+Checked<StampedTransform> transform_from(const nav_msgs::msg::Odometry& odometry);
+Checked<StampedTransform> transform_from(const geometry_msgs::msg::TransformStamped& transform);
+
+// ---- what pocd_play sends ----
+
+sensor_msgs::msg::Image image_message(const cv::Mat& image, const std::string& encoding,
+                                      StampNs stamp_ns, const std::string& frame_id);
+sensor_msgs::msg::CameraInfo camera_message(const CameraModel& camera, StampNs stamp_ns,
+                                            const std::string& frame_id);
+nav_msgs::msg::Odometry odometry_message(const StampedTransform& transform);
+geometry_msgs::msg::TransformStamped transform_message(const StampedTransform& transform);
+
+// ---- output ----
+
+/// Eight bytes of epoch and eight of the id, most significant first: never the same in two epochs.
+std::array<std::uint8_t, 16> object_uuid(std::uint64_t epoch, ObjectId id);
+
+pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, std::uint64_t epoch,
+                                           const ClassMap& classes, StampNs stamp_ns,
+                                           const std::string& frame_id);
+ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message);
+pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, std::uint64_t epoch,
+                                          const ClassMap& classes, const std::string& frame_id);
+
+pocd_msgs::msg::MapTile tile_message(const MapTile& tile, std::uint32_t map_id,
+                                     std::uint64_t epoch);
+/// CRC of the payload does not fit it: nothing.
+std::optional<MapTile> tile_from(const pocd_msgs::msg::MapTile& message);
+
+/// One step cut into messages of at most about `part_bytes` of payload each.
+std::vector<pocd_msgs::msg::MapDelta> delta_messages(const MapDelta& delta, std::uint32_t map_id,
+                                                     StampNs stamp_ns, std::size_t part_bytes);
+/// The step that all its parts (in order, complete) make; nothing when a CRC does not fit.
+std::optional<MapDelta> delta_from(const std::vector<pocd_msgs::msg::MapDelta>& parts);
+
+/// Every tile newer than `newer_than` and the keys of all, cut like a delta.
+std::vector<pocd_msgs::msg::MapSnapshotReply> snapshot_messages(
+    const MapPublisher& publisher, std::uint64_t newer_than,
+    const pocd_msgs::msg::MapSnapshotRequest& request, std::size_t part_bytes);
+
+TileKey key_from(const pocd_msgs::msg::TileKey& key);
+std::optional<MapTile> tile_from(const pocd_msgs::msg::TileData& data);
+MapDigest digest_from(const pocd_msgs::msg::MapDigest& digest);
+pocd_msgs::msg::MapDigest digest_message(const MapDigest& digest);
+
+}  // namespace pocd::dds

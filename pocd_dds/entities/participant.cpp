@@ -1,0 +1,184 @@
+#include "pocd_dds/entities/participant.hpp"
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <cstdlib>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
+#include <filesystem>
+#include <map>
+#include <mutex>
+
+#include "pocd/common/check.hpp"
+
+namespace pocd::dds {
+
+using namespace eprosima::fastdds::dds;  // NOLINT: this file is about nothing else
+namespace rtps = eprosima::fastdds::rtps;
+using eprosima::fastrtps::types::ReturnCode_t;
+
+namespace {
+
+// A 0.9 MB image through the default segment of 512 KB takes ten times as long; 32 MB hold one
+// second of three streams.
+constexpr std::uint32_t kSegmentBytes = 32u << 20;
+// Images in 64 KB fragments over UDP need room for a whole one.
+constexpr std::uint32_t kSocketBytes = 4u << 20;
+constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbers overflow
+
+// Map data leaves at most at this rate, so that objects never queue behind it. The name has to
+// outlive every participant.
+constexpr const char* kMapFlow = "pocd_map_flow";
+constexpr std::int32_t kMapBytesPerPeriod = 2 << 20;
+constexpr std::uint64_t kMapPeriodMs = 50;
+
+void set_transports(DomainParticipantQos& qos) {
+  auto shared_memory = std::make_shared<rtps::SharedMemTransportDescriptor>();
+  shared_memory->segment_size(kSegmentBytes);
+  auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
+  udp->sendBufferSize = kSocketBytes;
+  udp->receiveBufferSize = kSocketBytes;
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports = {shared_memory, udp};
+}
+
+template <class Qos>
+void apply(const Delivery& delivery, Qos& qos) {
+  qos.reliability().kind =
+      delivery.reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
+  qos.durability().kind =
+      delivery.transient_local ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+  qos.history().kind = delivery.keep_last > 0 ? KEEP_LAST_HISTORY_QOS : KEEP_ALL_HISTORY_QOS;
+  qos.history().depth = delivery.keep_last > 0 ? delivery.keep_last : 1;
+  // The defaults, 10 instances and 5000 samples, make write() fail beyond them. 0 means no bound.
+  qos.resource_limits().max_instances = delivery.max_instances;
+  qos.resource_limits().max_samples = delivery.max_samples;
+  qos.resource_limits().max_samples_per_instance =
+      delivery.keep_last > 0 ? delivery.keep_last : delivery.max_samples;
+  qos.resource_limits().allocated_samples = 0;
+  if (delivery.deadline_s > 0.0) {
+    qos.deadline().period = eprosima::fastrtps::Duration_t(delivery.deadline_s);
+  }
+  qos.endpoint().history_memory_policy =
+      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  qos.data_sharing().off();
+}
+
+}  // namespace
+
+int default_domain() {
+  const char* text = std::getenv("ROS_DOMAIN_ID");
+  if (text == nullptr || *text == '\0') return 0;
+  char* end = nullptr;
+  const long domain = std::strtol(text, &end, 10);
+  if (*end != '\0' || domain < 0 || domain > kLastDomain) {
+    throw InputError(std::string("ROS_DOMAIN_ID is \"") + text + "\", expected 0 to 232");
+  }
+  return static_cast<int>(domain);
+}
+
+struct Participant::Impl {
+  DomainParticipant* participant = nullptr;
+  Publisher* publisher = nullptr;
+  Subscriber* subscriber = nullptr;
+  std::mutex mutex;
+  std::map<std::string, Topic*> topics;
+
+  ~Impl() {
+    if (participant == nullptr) return;
+    participant->delete_contained_entities();
+    DomainParticipantFactory::get_instance()->delete_participant(participant);
+  }
+};
+
+Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Impl>()) {
+  if (options.domain < 0 || options.domain > kLastDomain) {
+    throw InputError("domain " + std::to_string(options.domain) + " is not in [0, 232]");
+  }
+  DomainParticipantFactory* factory = DomainParticipantFactory::get_instance();
+  factory->load_profiles();
+  if (!options.profiles_file.empty()) {
+    if (!std::filesystem::is_regular_file(options.profiles_file)) {
+      throw InputError(options.profiles_file + ": no such file (XML profiles)");
+    }
+    if (factory->load_XML_profiles_file(options.profiles_file) != ReturnCode_t::RETCODE_OK) {
+      throw InputError(options.profiles_file + ": not a valid file of XML profiles");
+    }
+  }
+  DomainParticipantQos qos;
+  factory->get_default_participant_qos(qos);
+  if (qos.transport().user_transports.empty() && qos.transport().use_builtin_transports) {
+    set_transports(qos);
+  }
+  if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
+  auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
+  flow->name = kMapFlow;
+  flow->max_bytes_per_period = kMapBytesPerPeriod;
+  flow->period_ms = kMapPeriodMs;
+  qos.flow_controllers().push_back(flow);
+
+  impl_->participant = factory->create_participant(options.domain, qos);
+  if (impl_->participant == nullptr) {
+    throw InputError("cannot join domain " + std::to_string(options.domain) +
+                     ": Fast DDS made no participant (see its messages; is a network up?)");
+  }
+  impl_->publisher = impl_->participant->create_publisher(PUBLISHER_QOS_DEFAULT);
+  impl_->subscriber = impl_->participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
+  POCD_CHECK(impl_->publisher != nullptr && impl_->subscriber != nullptr);
+}
+
+Participant::~Participant() = default;
+
+Topic* Participant::topic(const std::string& name, TypeSupport type) {
+  // Cyclone DDS 0.10 refuses endpoints that announce type information in Fast DDS's form.
+  type->auto_fill_type_information(false);
+  type->auto_fill_type_object(false);
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const auto known = impl_->topics.find(name);
+  if (known != impl_->topics.end()) {
+    if (known->second->get_type_name() != type.get_type_name()) {
+      throw InputError("topic " + name + " is used with two types, " +
+                       known->second->get_type_name() + " and " + type.get_type_name());
+    }
+    return known->second;
+  }
+  if (impl_->participant->find_type(type.get_type_name()).empty()) {
+    POCD_CHECK(type.register_type(impl_->participant) == ReturnCode_t::RETCODE_OK);
+  }
+  Topic* topic = impl_->participant->create_topic(name, type.get_type_name(), TOPIC_QOS_DEFAULT);
+  if (topic == nullptr) throw InputError("cannot create topic " + name);
+  impl_->topics.emplace(name, topic);
+  return topic;
+}
+
+DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& delivery) const {
+  DataWriterQos qos = impl_->publisher->get_default_datawriter_qos();
+  if (impl_->publisher->get_datawriter_qos_from_profile(topic, qos) == ReturnCode_t::RETCODE_OK) {
+    return qos;
+  }
+  apply(delivery, qos);
+  // The default of 3 s is how long a lost last sample would stay lost.
+  qos.reliable_writer_qos().times.heartbeatPeriod = eprosima::fastrtps::Duration_t(0.1);
+  qos.publish_mode().kind =
+      delivery.background ? ASYNCHRONOUS_PUBLISH_MODE : SYNCHRONOUS_PUBLISH_MODE;
+  if (delivery.background) qos.publish_mode().flow_controller_name = kMapFlow;
+  return qos;
+}
+
+DataReaderQos Participant::reader_qos(const std::string& topic, const Delivery& delivery) const {
+  DataReaderQos qos = impl_->subscriber->get_default_datareader_qos();
+  if (impl_->subscriber->get_datareader_qos_from_profile(topic, qos) == ReturnCode_t::RETCODE_OK) {
+    return qos;
+  }
+  apply(delivery, qos);
+  return qos;
+}
+
+DomainParticipant* Participant::get() const { return impl_->participant; }
+Publisher* Participant::publisher() const { return impl_->publisher; }
+Subscriber* Participant::subscriber() const { return impl_->subscriber; }
+
+}  // namespace pocd::dds

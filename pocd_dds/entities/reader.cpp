@@ -1,0 +1,78 @@
+#include "pocd_dds/entities/reader.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <atomic>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+
+#include "pocd/common/check.hpp"
+
+namespace pocd::dds {
+
+using namespace eprosima::fastdds::dds;  // NOLINT: this file is about nothing else
+using eprosima::fastrtps::types::ReturnCode_t;
+
+struct RawReader::Impl : DataReaderListener {
+  std::shared_ptr<Participant> participant;
+  DataReader* reader = nullptr;
+  Wakeup* wakeup = nullptr;
+  std::string topic;
+  std::atomic<int> matched{0}, ever_matched{0};
+  std::atomic<std::uint64_t> incompatible{0}, lost{0};
+
+  void on_data_available(DataReader*) override { wakeup->wake(); }
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
+    matched = status.current_count;
+    ever_matched = status.total_count;
+    wakeup->wake();
+  }
+  void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
+    lost += static_cast<std::uint64_t>(status.total_count_change);
+  }
+  void on_requested_incompatible_qos(DataReader*,
+                                     const RequestedIncompatibleQosStatus& status) override {
+    if (incompatible.fetch_add(1) == 0) {
+      spdlog::warn("{}: a writer does not offer the quality of service asked for (policy {})",
+                   topic, static_cast<int>(status.last_policy_id));
+    }
+  }
+};
+
+RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& spec,
+                     std::string topic, TypeSupport type, const Delivery& delivery, Wakeup& wakeup)
+    : topic_(std::move(topic)), impl_(std::make_unique<Impl>()) {
+  POCD_CHECK(type.get_type_name() == spec.type && type->m_isGetKeyDefined == spec.keyed);
+  impl_->participant = std::move(participant);
+  impl_->wakeup = &wakeup;
+  impl_->topic = topic_;
+  Participant& owner = *impl_->participant;
+  impl_->reader = owner.subscriber()->create_datareader(
+      owner.topic(topic_, type), owner.reader_qos(topic_, delivery), impl_.get());
+  if (impl_->reader == nullptr) throw InputError("cannot create a reader of topic " + topic_);
+}
+
+RawReader::~RawReader() {
+  impl_->reader->set_listener(nullptr);
+  impl_->participant->subscriber()->delete_datareader(impl_->reader);
+}
+
+int RawReader::matched() const { return impl_->matched; }
+int RawReader::ever_matched() const { return impl_->ever_matched; }
+std::uint64_t RawReader::incompatible() const { return impl_->incompatible; }
+std::uint64_t RawReader::lost() const { return impl_->lost; }
+
+bool RawReader::take_raw(void* sample, SampleMeta& meta) {
+  SampleInfo info;
+  if (impl_->reader->take_next_sample(sample, &info) != ReturnCode_t::RETCODE_OK) return false;
+  meta.valid = info.valid_data;
+  meta.disposed = info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
+  const eprosima::fastrtps::rtps::octet* key = info.instance_handle.value;
+  std::copy(key, key + meta.key.size(), meta.key.begin());
+  return true;
+}
+
+}  // namespace pocd::dds

@@ -1,0 +1,70 @@
+// A DataReader of one type, taken from by polling after a wake-up.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "pocd_dds/entities/participant.hpp"
+#include "pocd_dds/entities/wakeup.hpp"
+
+namespace pocd::dds {
+
+/// What came with a sample.
+struct SampleMeta {
+  bool valid =
+      true;  ///< false: the instance was disposed or lost its writers; no fields but the key
+  bool disposed = false;
+  /// Key of a keyed sample, as the instance handle has it; our keys are 16 bytes and fit as they
+  /// are.
+  std::array<std::uint8_t, 16> key{};
+};
+
+/// What does not depend on the type. take() from one thread at a time; the rest is thread-safe.
+class RawReader {
+ public:
+  /// `wakeup` is woken by new data and by changes of the match; it must outlive the reader. Throws
+  /// InputError naming the topic when Fast DDS makes no reader.
+  RawReader(std::shared_ptr<Participant> participant, const TopicSpec& spec, std::string topic,
+            eprosima::fastdds::dds::TypeSupport type, const Delivery& delivery, Wakeup& wakeup);
+  ~RawReader();
+  RawReader(const RawReader&) = delete;
+  RawReader& operator=(const RawReader&) = delete;
+
+  const std::string& topic() const { return topic_; }
+  /// Writers matched now, and ever.
+  int matched() const;
+  int ever_matched() const;
+  std::uint64_t incompatible() const;
+  /// Samples that the bus says were lost on the way.
+  std::uint64_t lost() const;
+
+ protected:
+  bool take_raw(void* sample, SampleMeta& meta);
+
+ private:
+  struct Impl;
+  std::string topic_;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// `PubSubType` is the generated type support, e.g. sensor_msgs::msg::ImagePubSubType.
+template <class PubSubType>
+class Reader : public RawReader {
+ public:
+  using Sample = typename PubSubType::type;
+
+  Reader(std::shared_ptr<Participant> participant, const TopicSpec& spec, Wakeup& wakeup)
+      : Reader(std::move(participant), spec, spec.name, spec.delivery, wakeup) {}
+  Reader(std::shared_ptr<Participant> participant, const TopicSpec& spec, const std::string& topic,
+         const Delivery& delivery, Wakeup& wakeup)
+      : RawReader(std::move(participant), spec, topic,
+                  eprosima::fastdds::dds::TypeSupport(new PubSubType()), delivery, wakeup) {}
+
+  /// The oldest sample not taken yet; false when there is none.
+  bool take(Sample& sample, SampleMeta& meta) { return take_raw(&sample, meta); }
+};
+
+}  // namespace pocd::dds

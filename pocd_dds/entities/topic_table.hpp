@@ -1,0 +1,101 @@
+// Every topic of the component: name, type, quality of service, direction. Nothing else names one.
+#pragma once
+
+#include <string>
+
+namespace pocd::dds {
+
+/// What the table says about delivery. Everything not listed here is the same for all topics.
+struct Delivery {
+  bool reliable = true;
+  bool transient_local = false;
+  int keep_last = 1;        ///< 0: keep all, bounded by max_samples
+  int max_samples = 0;      ///< 0: not bounded
+  int max_instances = 0;    ///< of keyed topics; 0: not bounded
+  bool background = false;  ///< sent by a thread of its own through the map's flow controller
+  double deadline_s = 0.0;  ///< 0: none
+};
+
+enum class Direction { kIn, kOut, kBoth };
+
+/// `name` may hold {robot}, which robot_topic() replaces.
+struct TopicSpec {
+  const char* name;
+  const char* type;
+  Direction direction;
+  bool keyed;
+  Delivery delivery;
+};
+
+namespace topics {
+
+constexpr Delivery best_effort(int keep_last) { return {false, false, keep_last, 0, 0, false, 0}; }
+constexpr Delivery reliable(int keep_last) { return {true, false, keep_last, 0, 0, false, 0}; }
+constexpr Delivery latched(int keep_last, int max_instances = 0) {
+  return {true, true, keep_last, 0, max_instances, false, 0};
+}
+
+inline constexpr TopicSpec kDepth{"rt/{robot}/depth/image_raw", "sensor_msgs::msg::dds_::Image_",
+                                  Direction::kIn, false, best_effort(5)};
+inline constexpr TopicSpec kCameraInfo{"rt/{robot}/depth/camera_info",
+                                       "sensor_msgs::msg::dds_::CameraInfo_", Direction::kIn, false,
+                                       best_effort(5)};
+inline constexpr TopicSpec kSegmentation{"rt/{robot}/segmentation",
+                                         "sensor_msgs::msg::dds_::Image_", Direction::kIn, false,
+                                         best_effort(5)};
+inline constexpr TopicSpec kColor{"rt/{robot}/color/image_raw", "sensor_msgs::msg::dds_::Image_",
+                                  Direction::kIn, false, best_effort(5)};
+inline constexpr TopicSpec kOdometry{"rt/{robot}/odom", "nav_msgs::msg::dds_::Odometry_",
+                                     Direction::kIn, false, best_effort(20)};
+inline constexpr TopicSpec kTf{"rt/tf", "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn, false,
+                               best_effort(100)};
+inline constexpr TopicSpec kTfStatic{"rt/tf_static", "tf2_msgs::msg::dds_::TFMessage_",
+                                     Direction::kIn, false, latched(100)};
+inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kOut,
+                                  false, reliable(1)};
+
+inline constexpr TopicSpec kObjects{"pocd/objects", "pocd_msgs::msg::dds_::ObjectState_",
+                                    Direction::kOut, true, latched(1, 20000)};
+inline constexpr TopicSpec kObjectEvents{"pocd/object_events", "pocd_msgs::msg::dds_::ObjectEvent_",
+                                         Direction::kOut, false, reliable(1000)};
+inline constexpr TopicSpec kMapTiles{"pocd/map/tiles",
+                                     "pocd_msgs::msg::dds_::MapTile_",
+                                     Direction::kOut,
+                                     true,
+                                     {true, true, 1, 0, 0, true, 0}};
+inline constexpr TopicSpec kMapDeltas{"pocd/map/deltas",
+                                      "pocd_msgs::msg::dds_::MapDelta_",
+                                      Direction::kOut,
+                                      false,
+                                      {true, false, 100, 0, 0, true, 0}};
+inline constexpr TopicSpec kMapManifest{"pocd/map/manifest", "pocd_msgs::msg::dds_::MapManifest_",
+                                        Direction::kOut, true, latched(1)};
+inline constexpr TopicSpec kSnapshotRequest{"pocd/map/snapshot_request",
+                                            "pocd_msgs::msg::dds_::MapSnapshotRequest_",
+                                            Direction::kBoth, false, reliable(10)};
+// A reply may have many parts, and all of them have to arrive.
+inline constexpr TopicSpec kSnapshotReply{"pocd/map/snapshot_reply",
+                                          "pocd_msgs::msg::dds_::MapSnapshotReply_",
+                                          Direction::kBoth,
+                                          false,
+                                          {true, false, 1000, 0, 0, true, 0}};
+inline constexpr TopicSpec kHealth{"pocd/health",
+                                   "pocd_msgs::msg::dds_::NodeHealth_",
+                                   Direction::kOut,
+                                   true,
+                                   {true, true, 1, 0, 0, false, 1.5}};
+inline constexpr TopicSpec kDiagnostics{"rt/diagnostics",
+                                        "diagnostic_msgs::msg::dds_::DiagnosticArray_",
+                                        Direction::kOut, false, reliable(10)};
+inline constexpr TopicSpec kMarkers{"rt/pocd/objects/markers",
+                                    "visualization_msgs::msg::dds_::MarkerArray_", Direction::kOut,
+                                    false, latched(1)};
+inline constexpr TopicSpec kOccupancy{"rt/pocd/map", "nav_msgs::msg::dds_::OccupancyGrid_",
+                                      Direction::kOut, false, latched(1)};
+
+}  // namespace topics
+
+/// `pattern` with every {robot} replaced.
+std::string robot_topic(const std::string& pattern, const std::string& robot);
+
+}  // namespace pocd::dds

@@ -1,0 +1,72 @@
+#include "pocd_dds/entities/writer.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+
+#include "pocd/common/check.hpp"
+
+namespace pocd::dds {
+
+using namespace eprosima::fastdds::dds;  // NOLINT: this file is about nothing else
+using eprosima::fastrtps::types::ReturnCode_t;
+
+struct RawWriter::Impl : DataWriterListener {
+  std::shared_ptr<Participant> participant;
+  DataWriter* writer = nullptr;
+  std::string topic;
+  std::atomic<int> matched{0};
+  std::atomic<std::uint64_t> incompatible{0};
+
+  void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override {
+    matched = status.current_count;
+  }
+  void on_offered_incompatible_qos(DataWriter*,
+                                   const OfferedIncompatibleQosStatus& status) override {
+    if (incompatible.fetch_add(1) == 0) {
+      spdlog::warn("{}: a reader asks for a quality of service that is not offered (policy {})",
+                   topic, static_cast<int>(status.last_policy_id));
+    }
+  }
+};
+
+RawWriter::RawWriter(std::shared_ptr<Participant> participant, const TopicSpec& spec,
+                     std::string topic, TypeSupport type, const Delivery& delivery)
+    : topic_(std::move(topic)), impl_(std::make_unique<Impl>()) {
+  POCD_CHECK(type.get_type_name() == spec.type && type->m_isGetKeyDefined == spec.keyed);
+  impl_->participant = std::move(participant);
+  impl_->topic = topic_;
+  Participant& owner = *impl_->participant;
+  impl_->writer = owner.publisher()->create_datawriter(
+      owner.topic(topic_, type), owner.writer_qos(topic_, delivery), impl_.get());
+  if (impl_->writer == nullptr) throw InputError("cannot create a writer of topic " + topic_);
+}
+
+RawWriter::~RawWriter() {
+  impl_->writer->set_listener(nullptr);
+  impl_->participant->publisher()->delete_datawriter(impl_->writer);
+}
+
+int RawWriter::matched() const { return impl_->matched; }
+std::uint64_t RawWriter::incompatible() const { return impl_->incompatible; }
+
+bool RawWriter::wait_acknowledged(std::chrono::milliseconds time) {
+  const eprosima::fastrtps::Duration_t limit(static_cast<long double>(time.count()) * 1e-3L);
+  return impl_->writer->wait_for_acknowledgments(limit) == ReturnCode_t::RETCODE_OK;
+}
+
+bool RawWriter::write_raw(void* sample) {
+  if (impl_->writer->write(sample)) return true;
+  if (failures_.fetch_add(1) == 0) spdlog::error("{}: Fast DDS refused to write a sample", topic_);
+  return false;
+}
+
+bool RawWriter::dispose_raw(void* sample) {
+  if (impl_->writer->dispose(sample, HANDLE_NIL) == ReturnCode_t::RETCODE_OK) return true;
+  if (failures_.fetch_add(1) == 0) spdlog::error("{}: Fast DDS refused to dispose", topic_);
+  return false;
+}
+
+}  // namespace pocd::dds

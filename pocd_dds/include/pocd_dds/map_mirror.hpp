@@ -1,0 +1,69 @@
+// A copy of the published map and objects in the process of a subscriber. No DDS type shows here.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pocd/map/map_delta.hpp"
+#include "pocd/pipeline/frame_result.hpp"
+
+namespace pocd {
+
+struct MirrorOptions {
+  int domain = 0;             ///< 0 .. 232
+  std::string profiles_file;  ///< XML profiles of the operator; empty: none
+  std::string name = "pocd_mirror";
+  std::uint32_t map_id = 0;
+};
+
+struct MirrorStatus {
+  /// The copy equals the published map at the newest version heard of, proven by the digest.
+  bool in_step = false;
+  std::string stale_because;  ///< empty when in step
+  std::uint64_t epoch = 0;    ///< run of the publisher; 0: none heard of
+  std::uint64_t version = 0;  ///< of the copy
+  MapDigest digest;           ///< of the copy
+  std::size_t tiles = 0;
+  std::size_t objects = 0;
+  bool publisher_present = false;
+  bool publisher_seen = false;  ///< at any time
+  bool final_version = false;   ///< the publisher has ended its run in order, at this version
+  std::uint64_t deltas = 0, gaps = 0, corrupt = 0, snapshots_asked = 0, snapshots_taken = 0;
+};
+
+struct MirrorContents {
+  MirrorStatus status;
+  double voxel_size_m = 0.0;
+  double truncation_m = 0.0;
+  std::string frame_id;
+  std::map<TileKey, MapTile> tiles;
+  std::vector<ObjectSnapshot> objects;  ///< by id
+};
+
+/// Follows the deltas with a thread of its own, from construction on. When it joins late or has missed
+/// something, it asks the publisher for a snapshot. Thread-safe.
+class MapMirror {
+ public:
+  /// Throws InputError when the bus cannot be used.
+  explicit MapMirror(const MirrorOptions& options);
+  ~MapMirror();
+  MapMirror(const MapMirror&) = delete;
+  MapMirror& operator=(const MapMirror&) = delete;
+
+  MirrorStatus status() const;
+  MirrorContents contents() const;
+  /// Waits until `condition` holds (called after every change, with the status). False: timed out.
+  bool wait_until(const std::function<bool(const MirrorStatus&)>& condition,
+                  std::chrono::milliseconds time) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pocd

@@ -1,0 +1,186 @@
+#include "pocd_dds/node/node.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "pocd/common/check.hpp"
+#include "pocd/pipeline/pocd_pipeline.hpp"
+#include "pocd_dds/node/map_publication.hpp"
+#include "pocd_dds/node/object_publication.hpp"
+#include "pocd_dds/node/visual_publication.hpp"
+
+namespace pocd::dds {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kPoll{50};
+constexpr double kStatusPeriodS = 1.0;
+
+double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
+
+}  // namespace
+
+struct Node::Impl {
+  explicit Impl(const NodeOptions& options)
+      : config(options.config),
+        participant(std::make_shared<Participant>(options.bus)),
+        pipeline(config.pipeline),
+        queue(static_cast<std::size_t>(config.node.queue_frames)),
+        objects(participant, config, options.epoch),
+        map(participant, config, options.epoch, wakeup),
+        visuals(participant, config),
+        status(participant, options.bus.name, options.epoch),
+        intake(participant, config.node, config.pipeline.classes, queue),
+        worker([this] { work(); }) {}
+
+  ~Impl() {
+    intake.stop();
+    if (worker.joinable()) worker.join();
+  }
+
+  void work();
+  void process(const Frame& frame);
+  void publish(bool now);
+  void send_status(const std::string& state);
+  bool finish();
+
+  const NodeFile config;
+  const std::shared_ptr<Participant> participant;
+  PocdPipeline pipeline;  // worker only
+  FrameQueue queue;
+  Wakeup wakeup;
+
+  // Guards everything below that the worker and run() both use.
+  mutable std::mutex mutex;
+  ObjectPublication objects;
+  MapPublication map;
+  VisualPublication visuals;
+  StatusPublication status;
+  WorkStatus counts;
+  double busy_ms = 0.0;
+  std::uint64_t busy_frames = 0;
+  std::exception_ptr failure;
+  std::atomic<bool> failed{false};
+
+  Intake intake;
+  std::thread worker;
+};
+
+void Node::Impl::work() {
+  try {
+    while (!queue.finished()) {
+      const std::optional<Frame> frame = queue.pop(kPoll);
+      if (frame) {
+        intake.room_made();
+        process(*frame);
+      }
+      publish(false);
+    }
+    publish(true);
+  } catch (...) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    failure = std::current_exception();
+    failed = true;
+  }
+}
+
+void Node::Impl::process(const Frame& frame) {
+  const auto start = Clock::now();
+  FrameResult result;
+  try {
+    result = pipeline.process_frame(frame);
+  } catch (const InputError& error) {
+    result.accepted = false;
+    result.warnings.push_back(error.what());
+  }
+  const std::lock_guard<std::mutex> lock(mutex);
+  busy_ms += 1e3 * seconds(Clock::now() - start);
+  ++busy_frames;
+  ++counts.processed;
+  if (!result.accepted) ++counts.refused;
+  counts.stamp_ns = frame.stamp_ns;
+  for (const std::string& warning : result.warnings) {
+    counts.last_warning = frame.robot + " frame " + std::to_string(frame.sequence) + ": " + warning;
+    if (counts.warnings++ == 0) spdlog::warn("{} (more in diagnostics)", counts.last_warning);
+  }
+  objects.add(result, frame.stamp_ns);
+}
+
+void Node::Impl::publish(bool now) {
+  const std::lock_guard<std::mutex> lock(mutex);
+  objects.send_due(now);
+  map.send_due(pipeline.map(), counts.stamp_ns, now);
+}
+
+void Node::Impl::send_status(const std::string& state) {
+  const IntakeStatus input = intake.status();
+  const std::lock_guard<std::mutex> lock(mutex);
+  counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
+  busy_ms = 0.0;
+  busy_frames = 0;
+  counts.write_failures = objects.failures() + map.failures();
+  counts.map_bytes = map.bytes();
+  counts.map_version = map.publisher().version();
+  counts.objects = objects.objects().size();
+  map.send_manifest(counts.objects, state == "stopped");
+  status.send(input, counts, queue.size(), queue.dropped(), state);
+}
+
+bool Node::Impl::finish() {
+  intake.stop();
+  worker.join();
+  if (failure) std::rethrow_exception(failure);
+  send_status("stopped");
+  const std::lock_guard<std::mutex> lock(mutex);
+  visuals.send_markers(objects.objects(), counts.stamp_ns);
+  visuals.send_occupancy(map.publisher().tiles(), counts.stamp_ns);
+  const auto wait =
+      std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
+  // A late subscriber that asked for a snapshot just now still gets it.
+  map.answer_requests();
+  const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait);
+  if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
+  return acknowledged && counts.write_failures == 0;
+}
+
+Node::Node(const NodeOptions& options) {
+  POCD_CHECK(options.epoch != 0);
+  impl_ = std::make_unique<Impl>(options);
+}
+
+Node::~Node() = default;
+
+bool Node::run(const std::atomic<bool>& stop) {
+  Impl& node = *impl_;
+  Clock::time_point status_sent{}, visuals_sent{};
+  while (!stop && !node.failed) {
+    node.wakeup.wait_for(kPoll);
+    {
+      const std::lock_guard<std::mutex> lock(node.mutex);
+      node.map.answer_requests();
+    }
+    const auto now = Clock::now();
+    if (seconds(now - status_sent) >= kStatusPeriodS) {
+      status_sent = now;
+      node.send_status("running");
+    }
+    if (seconds(now - visuals_sent) >= node.config.node.visual_period_s) {
+      visuals_sent = now;
+      const std::lock_guard<std::mutex> lock(node.mutex);
+      node.visuals.send_markers(node.objects.objects(), node.counts.stamp_ns);
+      node.visuals.send_occupancy(node.map.publisher().tiles(), node.counts.stamp_ns);
+    }
+  }
+  return node.finish();
+}
+
+WorkStatus Node::work_status() const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->counts;
+}
+
+}  // namespace pocd::dds

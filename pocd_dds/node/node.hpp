@@ -1,0 +1,38 @@
+// The component on the bus: frames in, objects and map out.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+
+#include "pocd_dds/node/node_config.hpp"
+#include "pocd_dds/node/status_publication.hpp"
+
+namespace pocd::dds {
+
+struct NodeOptions {
+  BusOptions bus;
+  NodeFile config;
+  std::uint64_t epoch = 0;  ///< names this run in every identifier; never 0, never used twice
+};
+
+/// Owns participant, intake thread and worker thread.
+class Node {
+ public:
+  /// Throws InputError when the bus or the configuration cannot be used.
+  explicit Node(const NodeOptions& options);
+  ~Node();
+
+  /// Runs until `stop` is true; then stops the intake, processes what is queued, publishes the last
+  /// state and waits for subscribers to acknowledge it. False when they did not in time, or when a
+  /// sample could not be written.
+  bool run(const std::atomic<bool>& stop);
+
+  WorkStatus work_status() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pocd::dds

@@ -1,0 +1,37 @@
+#include "pocd_dds/node/node_config.hpp"
+
+#include <cmath>
+#include <set>
+
+namespace pocd::dds {
+
+std::vector<std::string> MountConfig::inconsistencies() const {
+  const double length = std::sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
+  if (std::abs(length - 1.0) <= 1e-3) return {};
+  return {"qx, qy, qz, qw: the quaternion has length " + std::to_string(length) + ", expected 1"};
+}
+
+std::vector<std::string> NodeConfig::inconsistencies() const {
+  std::vector<std::string> problems;
+  std::set<std::string> names;
+  for (const RobotConfig& robot : robots) {
+    if (robot.name.empty()) problems.push_back("robots: a robot has no name");
+    if (!robot.name.empty() && !names.insert(robot.name).second) {
+      problems.push_back("robots: the name " + robot.name + " is used twice");
+    }
+  }
+  if (robots.size() > 1) {
+    for (const std::string* pattern : {&topics.depth, &topics.camera_info, &topics.segmentation,
+                                       &topics.color, &topics.odometry}) {
+      if (pattern->find("{robot}") == std::string::npos) {
+        problems.push_back("topics: \"" + *pattern + "\" lacks {robot}, and there are several");
+      }
+    }
+  }
+  if (!(occupancy_low_m < occupancy_high_m)) {
+    problems.push_back("occupancy_low_m must be below occupancy_high_m");
+  }
+  return problems;
+}
+
+}  // namespace pocd::dds

@@ -1,0 +1,51 @@
+#include "pocd_dds/node/object_publication.hpp"
+
+namespace pocd::dds {
+
+ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& participant,
+                                     const NodeFile& config, std::uint64_t epoch)
+    : node_(config.node),
+      classes_(config.pipeline.classes),
+      epoch_(epoch),
+      states_(participant, topics::kObjects),
+      events_(participant, topics::kObjectEvents) {}
+
+void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
+  stamp_ns_ = stamp_ns;
+  for (const ObjectEvent& event : result.events) {
+    auto message = event_message(event, epoch_, classes_, node_.map_frame);
+    events_.write(message);
+  }
+  for (const ObjectSnapshot& object : result.changed_objects) {
+    objects_[object.id] = object;
+    changed_.insert(object.id);
+  }
+  for (const ObjectId id : result.retired) {
+    objects_.erase(id);
+    changed_.erase(id);
+    if (published_.erase(id) == 0) continue;
+    pocd_msgs::msg::ObjectState gone;
+    gone.uuid(object_uuid(epoch_, id));
+    states_.dispose(gone);
+  }
+}
+
+void ObjectPublication::send_due(bool now) {
+  if (changed_.empty()) return;
+  const auto time = std::chrono::steady_clock::now();
+  if (!now && std::chrono::duration<double>(time - last_sent_).count() < node_.object_period_s) {
+    return;
+  }
+  last_sent_ = time;
+  for (const ObjectId id : changed_) {
+    auto message = object_message(objects_.at(id), epoch_, classes_, stamp_ns_, node_.map_frame);
+    if (states_.write(message)) published_.insert(id);
+  }
+  changed_.clear();
+}
+
+bool ObjectPublication::wait_acknowledged(std::chrono::milliseconds time) {
+  return states_.wait_acknowledged(time) && events_.wait_acknowledged(time);
+}
+
+}  // namespace pocd::dds

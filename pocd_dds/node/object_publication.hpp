@@ -1,0 +1,43 @@
+// Objects and events on the bus.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/entities/writer.hpp"
+#include "pocd_dds/node/node_config.hpp"
+#include "pocd_msgsPubSubTypes.h"
+
+namespace pocd::dds {
+
+/// Not thread-safe.
+class ObjectPublication {
+ public:
+  ObjectPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
+                    std::uint64_t epoch);
+
+  /// Events leave at once; an object's state at most once per period.
+  void add(const FrameResult& result, StampNs stamp_ns);
+  /// Sends states that are due, or all that are left with `now`.
+  void send_due(bool now);
+  bool wait_acknowledged(std::chrono::milliseconds time);
+
+  const std::map<ObjectId, ObjectSnapshot>& objects() const { return objects_; }
+  std::uint64_t failures() const { return states_.failures() + events_.failures(); }
+
+ private:
+  const NodeConfig node_;
+  const ClassMap classes_;
+  const std::uint64_t epoch_;
+  Writer<pocd_msgs::msg::ObjectStatePubSubType> states_;
+  Writer<pocd_msgs::msg::ObjectEventPubSubType> events_;
+  std::map<ObjectId, ObjectSnapshot> objects_;
+  std::set<ObjectId> changed_, published_;
+  StampNs stamp_ns_ = 0;
+  std::chrono::steady_clock::time_point last_sent_{};
+};
+
+}  // namespace pocd::dds

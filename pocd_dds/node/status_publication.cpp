@@ -1,0 +1,117 @@
+#include "pocd_dds/node/status_publication.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "pocd_dds/bridge/conversions.hpp"
+
+namespace pocd::dds {
+namespace {
+
+constexpr std::uint8_t kOk = 0, kWarning = 1, kError = 2;  // diagnostic_msgs/DiagnosticStatus
+
+StampNs wall_clock_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+diagnostic_msgs::msg::DiagnosticStatus status_of(std::uint8_t level, const std::string& name,
+                                                 const std::string& message) {
+  diagnostic_msgs::msg::DiagnosticStatus status;
+  status.level(level);
+  status.name(name);
+  status.message(message);
+  status.hardware_id("pocd");
+  return status;
+}
+
+void add(diagnostic_msgs::msg::DiagnosticStatus& status, const std::string& key,
+         const std::string& value) {
+  diagnostic_msgs::msg::KeyValue entry;
+  entry.key(key);
+  entry.value(value);
+  status.values().push_back(entry);
+}
+
+/// The node's instance in pocd/health: its epoch, which no other node has.
+std::array<std::uint8_t, 16> node_key(std::uint64_t epoch) {
+  return object_uuid(epoch, ObjectId::kNone);
+}
+
+}  // namespace
+
+StatusPublication::StatusPublication(const std::shared_ptr<Participant>& participant,
+                                     std::string name, std::uint64_t epoch)
+    : name_(std::move(name)),
+      epoch_(epoch),
+      health_(participant, topics::kHealth),
+      diagnostics_(participant, topics::kDiagnostics) {}
+
+void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
+                             std::uint64_t queue_dropped, const std::string& state) {
+  pocd_msgs::msg::NodeHealth health;
+  health.node(node_key(epoch_));
+  health.stamp(to_time(wall_clock_ns()));
+  health.name(name_);
+  health.version(POCD_VERSION);
+  health.epoch(epoch_);
+  const bool failing = work.write_failures > 0;
+  health.level(failing ? kError : intake.problems.empty() && queue_dropped == 0 ? kOk : kWarning);
+  health.message(failing ? "samples could not be written" : state);
+  health.frames_processed(work.processed);
+  health.frames_refused(work.refused);
+  health.queue_length(static_cast<std::uint32_t>(queued));
+  health.processing_ms(work.processing_ms);
+  health.objects(static_cast<std::uint32_t>(work.objects));
+  health.map_version(work.map_version);
+
+  diagnostic_msgs::msg::DiagnosticArray diagnostics;
+  diagnostics.header().stamp(health.stamp());
+  auto node = status_of(health.level(), name_, health.message());
+  std::uint64_t received = 0, dropped = queue_dropped;
+  for (const RobotStatus& robot : intake.robots) {
+    received += robot.frames;
+    dropped += robot.dropped;
+    pocd_msgs::msg::RobotHealth entry;
+    entry.name(robot.name);
+    entry.frames(robot.frames);
+    entry.dropped(robot.dropped);
+    entry.waiting_for(robot.waiting_for);
+    health.robots().push_back(entry);
+
+    const std::string message = !robot.live                 ? "no source of depth images"
+                                : robot.waiting_for.empty() ? "ok"
+                                                            : robot.waiting_for;
+    auto status = status_of(robot.live ? kOk : kWarning, name_ + ": " + robot.name, message);
+    add(status, "frames", std::to_string(robot.frames));
+    add(status, "frames dropped as incomplete", std::to_string(robot.dropped));
+    add(status, "images lost on the bus", std::to_string(robot.lost));
+    diagnostics.status().push_back(status);
+  }
+  health.frames_received(received);
+  health.frames_dropped(dropped);
+  for (const ProblemCounter::Entry& entry : intake.problems) {
+    pocd_msgs::msg::InputProblem problem;
+    problem.topic(entry.topic);
+    problem.reason(entry.reason);
+    problem.count(entry.count);
+    health.problems().push_back(problem);
+    add(node, entry.topic + ": " + entry.reason, std::to_string(entry.count));
+  }
+  add(node, "frames received", std::to_string(received));
+  add(node, "frames processed", std::to_string(work.processed));
+  add(node, "frames refused", std::to_string(work.refused));
+  add(node, "frames dropped", std::to_string(dropped));
+  add(node, "frames in queue", std::to_string(queued));
+  add(node, "processing [ms per frame]", std::to_string(work.processing_ms));
+  add(node, "objects", std::to_string(work.objects));
+  add(node, "map version", std::to_string(work.map_version));
+  add(node, "map bytes published", std::to_string(work.map_bytes));
+  if (!work.last_warning.empty()) add(node, "last warning", work.last_warning);
+  diagnostics.status().insert(diagnostics.status().begin(), node);
+  health_.write(health);
+  diagnostics_.write(diagnostics);
+}
+
+}  // namespace pocd::dds

@@ -1,0 +1,41 @@
+// How the node is doing, on the bus.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+
+#include "diagnostic_msgsPubSubTypes.h"
+#include "pocd_dds/entities/writer.hpp"
+#include "pocd_dds/node/intake.hpp"
+#include "pocd_msgsPubSubTypes.h"
+
+namespace pocd::dds {
+
+/// What the worker knows.
+struct WorkStatus {
+  std::uint64_t processed = 0, refused = 0, warnings = 0;
+  double processing_ms = 0.0;  ///< mean of the last second, 0 without frames
+  std::string last_warning;
+  std::uint64_t write_failures = 0;
+  std::uint64_t map_bytes = 0, map_version = 0, objects = 0;
+  StampNs stamp_ns = 0;  ///< of the last frame
+};
+
+/// Not thread-safe.
+class StatusPublication {
+ public:
+  StatusPublication(const std::shared_ptr<Participant>& participant, std::string name,
+                    std::uint64_t epoch);
+
+  void send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
+            std::uint64_t queue_dropped, const std::string& state);
+
+ private:
+  std::string name_;
+  std::uint64_t epoch_;
+  Writer<pocd_msgs::msg::NodeHealthPubSubType> health_;
+  Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType> diagnostics_;
+};
+
+}  // namespace pocd::dds
