@@ -72,6 +72,7 @@ int main(int argc, char** argv) {
     options.stop = &stop_requested;
     options.show_progress = isatty(STDERR_FILENO) != 0;
     options.dataset.label_divisor = options.config.classes.label_divisor;
+    options.dataset.classes = options.config.classes;
     print(pocd::run_map(options, std::cerr), options.output);
     return std::cout.flush() ? 0 : 1;
   } catch (const std::exception& error) {

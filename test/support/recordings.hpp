@@ -62,8 +62,8 @@ inline std::vector<Kept> read_all(RecordingReader& reader) {
   return all;
 }
 
-/// `count` messages of random sizes up to `most_bytes` on three topics, times 10 apart; returns them
-/// in the order of their times.
+/// `count` messages of random sizes up to `most_bytes` on three topics, times 10 apart; returns
+/// them in the order of their times.
 inline std::vector<Kept> write_messages(McapWriter& writer, int count, std::size_t most_bytes,
                                         std::uint64_t seed = 1) {
   const std::uint16_t schema = writer.add_schema("std_msgs/msg/String", "ros2msg", "string data\n");

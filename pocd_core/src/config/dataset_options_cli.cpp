@@ -76,10 +76,12 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
     add(app.add_option_function<std::string>(flag, take, help));
   };
 
-  add(app.add_option("--dataset", options.format, "Format of the inputs: torwic, rgbd, pcd, sim"))
+  add(app.add_option("--dataset", options.format,
+                     "Format of the inputs: torwic, rgbd, pcd, sim, mcap"))
       ->required();
-  add(app.add_option("--input", options.inputs,
-                     "Folder (sim: scenario file); repeat it to visit several as one run"))
+  add(app.add_option(
+          "--input", options.inputs,
+          "Folder (sim: scenario file; mcap: recording); repeat it to visit several as one run"))
       ->required()
       ->allow_extra_args(false);
   add(app.add_option("--repeat", options.repeat, "Frames made of each still image (pcd)"))
@@ -114,6 +116,17 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
       ->capture_default_str();
   add(app.add_option("--sensor", options.sensor, "Sensor model instead of the scenario's (sim)"))
       ->check(CLI::IsMember({"perfect", "stereo"}));
+  add(app.add_flag("--as-live", options.recording.as_live,
+                   "Only the frames that the component took while they were recorded (mcap)"));
+  const auto add_topic = [&](const std::string& flag, std::string& topic) {
+    add(app.add_option(flag, topic, "Topic in a recording; {robot} stands for any name (mcap)"))
+        ->capture_default_str();
+  };
+  add_topic("--depth-topic", options.recording.depth);
+  add_topic("--camera-info-topic", options.recording.camera_info);
+  add_topic("--segmentation-topic", options.recording.segmentation);
+  add_topic("--color-topic", options.recording.color);
+  add_topic("--odometry-topic", options.recording.odometry);
   for (CLI::Option* option : all) option->group("Frames");
 }
 

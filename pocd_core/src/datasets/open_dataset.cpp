@@ -13,15 +13,16 @@ namespace fs = std::filesystem;
 
 /// camera.yaml beside the PCD files of a folder:
 ///   camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 319.5, cy: 239.5}
-///   T_W_C: {translation: [x, y, z], quaternion_xyzw: [x, y, z, w]}   # camera optical frame in the map
+///   T_W_C: {translation: [x, y, z], quaternion_xyzw: [x, y, z, w]}   # camera optical frame in the
+///   map
 /// Either may be left to the options.
 void read_camera_file(const fs::path& file, DatasetOptions& options) {
   YamlFields top(load_yaml_file(file), file.string());
   if (top.has("camera")) {
     YamlFields camera(top.node("camera"), file.string() + ": camera");
-    options.camera = CameraModel{camera.integer("width"), camera.integer("height"),
-                                 camera.number("fx"),     camera.number("fy"),
-                                 camera.number("cx"),     camera.number("cy")};
+    options.camera =
+        CameraModel{camera.integer("width"), camera.integer("height"), camera.number("fx"),
+                    camera.number("fy"),     camera.number("cx"),      camera.number("cy")};
     camera.finish();
     validate(*options.camera, file.string());
   }
@@ -78,7 +79,9 @@ std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options) {
   if (options.format == "rgbd") return open_rgbd(options);
   if (options.format == "pcd") return open_pcd_with_camera_file(options);
   if (options.format == "sim") return open_sim(options);
-  throw InputError("dataset: format '" + options.format + "' is unknown, one of: torwic, rgbd, pcd, sim");
+  if (options.format == "mcap") return open_recorded(options);
+  throw InputError("dataset: format '" + options.format +
+                   "' is unknown, one of: torwic, rgbd, pcd, sim, mcap");
 }
 
 }  // namespace pocd

@@ -21,7 +21,8 @@ class FileSource : public ByteSource {
     if (fd_ < 0 || ::fstat(fd_, &status) != 0) {
       const int error = errno;
       if (fd_ >= 0) ::close(fd_);
-      throw InputError(path.string() + ": cannot be read: " + std::system_category().message(error));
+      throw InputError(path.string() +
+                       ": cannot be read: " + std::system_category().message(error));
     }
     if (!S_ISREG(status.st_mode)) {
       ::close(fd_);
@@ -39,7 +40,8 @@ class FileSource : public ByteSource {
       const ssize_t n = ::pread(fd_, out + done, size - done, static_cast<off_t>(offset + done));
       if (n < 0 && errno == EINTR) continue;
       if (n < 0) {
-        throw DamagedData(offset + done, "cannot be read: " + std::system_category().message(errno));
+        throw DamagedData(offset + done,
+                          "cannot be read: " + std::system_category().message(errno));
       }
       if (n == 0) throw DamagedData(offset + done, "the file ends here");
       done += static_cast<std::size_t>(n);

@@ -9,12 +9,12 @@ constexpr bool kHostIsLittle = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
 
 CdrReader::CdrReader(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {
   if (size < 4) {
-    throw DamagedData(0, "payload of " + std::to_string(size) +
-                             " bytes has no encapsulation header");
+    throw DamagedData(0,
+                      "payload of " + std::to_string(size) + " bytes has no encapsulation header");
   }
   if (data[0] != 0 || data[1] > 1) {
-    throw DamagedData(0, "encapsulation " + std::to_string(data[0] * 256 + data[1]) +
-                             " is not plain CDR (0, 1)");
+    throw DamagedData(
+        0, "encapsulation " + std::to_string(data[0] * 256 + data[1]) + " is not plain CDR (0, 1)");
   }
   little_endian_ = data[1] == 1;
   swap_ = little_endian_ != kHostIsLittle;

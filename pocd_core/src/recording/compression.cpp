@@ -57,8 +57,8 @@ Bytes decompress_zstd(const std::uint8_t* data, std::size_t size, std::size_t ou
 std::uint32_t crc32_of(const std::uint8_t* data, std::size_t size, std::uint32_t crc) {
   uLong value = crc;
   while (size > 0) {
-    const auto step = static_cast<uInt>(
-        std::min<std::size_t>(size, std::numeric_limits<uInt>::max()));
+    const auto step =
+        static_cast<uInt>(std::min<std::size_t>(size, std::numeric_limits<uInt>::max()));
     value = ::crc32(value, data, step);
     data += step;
     size -= step;

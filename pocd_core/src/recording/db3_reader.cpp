@@ -29,7 +29,8 @@ class Db3Reader : public RecordingReader {
     sqlite3* raw = nullptr;
     const int result = sqlite3_open_v2(file.c_str(), &raw, SQLITE_OPEN_READONLY, nullptr);
     database_.reset(raw);
-    if (result != SQLITE_OK) throw InputError(name_ + ": cannot be opened: " + sqlite3_errstr(result));
+    if (result != SQLITE_OK)
+      throw InputError(name_ + ": cannot be opened: " + sqlite3_errstr(result));
     sqlite3_limit(raw, SQLITE_LIMIT_LENGTH, static_cast<int>(limits.chunk_bytes));
     sqlite3_db_config(raw, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     std::error_code error;
@@ -74,7 +75,8 @@ class Db3Reader : public RecordingReader {
 
   void seek(std::uint64_t log_time_ns) override {
     messages_ = prepare(
-        "SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= ?1 ORDER BY timestamp, id");
+        "SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= ?1 ORDER BY timestamp, "
+        "id");
     const auto most = static_cast<std::uint64_t>(std::numeric_limits<sqlite3_int64>::max());
     sqlite3_bind_int64(messages_.get(), 1, static_cast<sqlite3_int64>(std::min(log_time_ns, most)));
   }
@@ -103,10 +105,10 @@ class Db3Reader : public RecordingReader {
 
   void read_topics() {
     const bool qos = has_qos();
-    const Statement topics =
-        prepare(qos ? "SELECT id, name, type, serialization_format, offered_qos_profiles FROM topics "
-                      "ORDER BY id"
-                    : "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
+    const Statement topics = prepare(
+        qos ? "SELECT id, name, type, serialization_format, offered_qos_profiles FROM topics "
+              "ORDER BY id"
+            : "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
     int result = sqlite3_step(topics.get());
     for (; result == SQLITE_ROW; result = sqlite3_step(topics.get())) {
       RecordedChannel channel;
@@ -121,8 +123,8 @@ class Db3Reader : public RecordingReader {
   }
 
   void read_counts() {
-    const Statement counts =
-        prepare("SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY 1");
+    const Statement counts = prepare(
+        "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY 1");
     int result = sqlite3_step(counts.get());
     for (; result == SQLITE_ROW; result = sqlite3_step(counts.get())) {
       const auto count = static_cast<std::uint64_t>(sqlite3_column_int64(counts.get(), 1));

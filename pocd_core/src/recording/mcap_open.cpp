@@ -1,4 +1,5 @@
-// How an MCAP file is understood before its messages are read: by its summary, or by a walk through.
+// How an MCAP file is understood before its messages are read: by its summary, or by a walk
+// through.
 #include <algorithm>
 #include <cstdlib>
 
@@ -13,7 +14,8 @@ constexpr std::uint64_t kLargestDefinition = 16u << 20;
 // A summary grows with the chunks: 100 bytes and 10 per channel each.
 constexpr std::uint64_t kLargestSummary = 256u << 20;
 constexpr std::size_t kSearchBytes = 1u << 20;
-// Opcode, length, start, end, size, crc, compression ("zstd" is the longest name), size of the records.
+// Opcode, length, start, end, size, crc, compression ("zstd" is the longest name), size of the
+// records.
 constexpr std::size_t kChunkSignatureBytes = kRecordHeaderBytes + 8 + 8 + 8 + 4 + 4 + 4 + 8;
 
 }  // namespace
@@ -40,7 +42,8 @@ bool McapReader::read_summary() {
     read_summary_records(footer, footer_offset);
     return true;
   } catch (const DamagedData& damage) {
-    note(damage.offset(), std::string("summary is damaged: ") + damage.what() + "; reading the file through");
+    note(damage.offset(),
+         std::string("summary is damaged: ") + damage.what() + "; reading the file through");
   }
   schemas_.clear();
   channel_records_.clear();
@@ -76,7 +79,8 @@ void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t 
       if (opcode == Opcode::kStatistics) statistics = parse_statistics(content);
       if (opcode == Opcode::kChunkIndex) {
         const ChunkIndexRecord index = parse_chunk_index(content);
-        if (index.chunk_offset >= footer.summary_start || index.chunk_length <= kRecordHeaderBytes ||
+        if (index.chunk_offset >= footer.summary_start ||
+            index.chunk_length <= kRecordHeaderBytes ||
             index.chunk_length > footer.summary_start - index.chunk_offset) {
           throw DamagedData(at, "a chunk is said to be at " + std::to_string(index.chunk_offset));
         }
@@ -129,7 +133,8 @@ bool McapReader::looks_like_chunk(std::uint64_t offset, const std::uint8_t* byte
 std::uint64_t McapReader::find_chunk(std::uint64_t from) const {
   const std::uint64_t size = source_->size();
   while (from + kChunkSignatureBytes <= size) {
-    const auto length = static_cast<std::size_t>(std::min<std::uint64_t>(kSearchBytes, size - from));
+    const auto length =
+        static_cast<std::size_t>(std::min<std::uint64_t>(kSearchBytes, size - from));
     const Bytes bytes = source_->read(from, length);
     for (std::size_t i = 0; i + kChunkSignatureBytes <= length; ++i) {
       if (looks_like_chunk(from + i, bytes.data() + i)) return from + i;
@@ -159,8 +164,10 @@ void McapReader::scan_record(Opcode opcode, std::uint64_t offset, std::uint64_t 
     block.start_ns = entries.front().log_time_ns;
     block.end_ns = entries.back().log_time_ns;
     blocks_.push_back(block);
-  } else if (opcode == Opcode::kMessage || opcode == Opcode::kSchema || opcode == Opcode::kChannel) {
-    const std::uint64_t limit = opcode == Opcode::kMessage ? limits_.chunk_bytes : kLargestDefinition;
+  } else if (opcode == Opcode::kMessage || opcode == Opcode::kSchema ||
+             opcode == Opcode::kChannel) {
+    const std::uint64_t limit =
+        opcode == Opcode::kMessage ? limits_.chunk_bytes : kLargestDefinition;
     if (length > limit) {
       throw DamagedData(offset, "record of " + std::to_string(length) + " bytes is too large");
     }
@@ -192,7 +199,8 @@ void McapReader::scan() {
     std::string problem;
     std::uint64_t next = offset;
     try {
-      if (size - offset < kRecordHeaderBytes) throw DamagedData(offset, "the file ends in a record");
+      if (size - offset < kRecordHeaderBytes)
+        throw DamagedData(offset, "the file ends in a record");
       const Bytes head = source_->read(offset, kRecordHeaderBytes);
       ByteReader in(head.data(), head.size());
       const auto opcode = in.number<std::uint8_t>();

@@ -50,7 +50,8 @@ void McapReader::check_start() {
   if (!magic) note(0, "magic is wrong, but a header record follows");
 }
 
-// Small chunks can hold large definitions: without a bound a file of a few megabytes fills the memory.
+// Small chunks can hold large definitions: without a bound a file of a few megabytes fills the
+// memory.
 void McapReader::count_definition(std::size_t bytes) {
   constexpr std::uint64_t kMostDefinitionBytes = 64u << 20;
   if (definition_bytes_ + bytes > kMostDefinitionBytes) {
@@ -66,8 +67,8 @@ void McapReader::define(const SchemaRecord& schema, std::uint64_t offset) {
   }
   const auto [known, fresh] = schemas_.emplace(schema.id, schema);
   if (!fresh && (known->second.name != schema.name || known->second.data != schema.data)) {
-    note(offset, "schema " + std::to_string(schema.id) + " is defined twice, differently; the first " +
-                     "definition is kept");
+    note(offset, "schema " + std::to_string(schema.id) +
+                     " is defined twice, differently; the first " + "definition is kept");
   }
 }
 
@@ -95,7 +96,8 @@ void McapReader::define(const ChannelRecord& channel, std::uint64_t offset) {
     bytes += recorded.schema.size();
   } else if (channel.schema_id != 0) {
     note(offset, "channel " + std::to_string(channel.id) + " (" + channel.topic.substr(0, 80) +
-                     ") names schema " + std::to_string(channel.schema_id) + ", which is not there");
+                     ") names schema " + std::to_string(channel.schema_id) +
+                     ", which is not there");
   }
   count_definition(bytes);
   channel_records_.emplace(channel.id, channel);
@@ -150,14 +152,14 @@ std::vector<McapReader::Entry> McapReader::entries_of(const Bytes& bytes, const 
       const MessageHeader header = parse_message_header(content);
       const auto channel = channel_index_.find(header.channel);
       if (channel == channel_index_.end()) {
-        throw DamagedData(at, "message on channel " + std::to_string(header.channel) +
-                                  ", which is not defined");
+        throw DamagedData(
+            at, "message on channel " + std::to_string(header.channel) + ", which is not defined");
       }
       if (scanning) {
         ++channels_[channel->second].messages;
         ++info_.messages;
-        info_.start_ns = info_.messages == 1 ? header.log_time_ns
-                                             : std::min(info_.start_ns, header.log_time_ns);
+        info_.start_ns =
+            info_.messages == 1 ? header.log_time_ns : std::min(info_.start_ns, header.log_time_ns);
         info_.end_ns = std::max(info_.end_ns, header.log_time_ns);
       } else if (header.log_time_ns < from_ || !wanted(channels_[channel->second])) {
         continue;
@@ -165,15 +167,15 @@ std::vector<McapReader::Entry> McapReader::entries_of(const Bytes& bytes, const 
       entries.push_back({header.log_time_ns, begin, size});
     } catch (const DamagedData& damage) {
       if (scanning || told_.emplace(block.offset, true).second) {
-        note(block.offset, "in the chunk, at its byte " + std::to_string(at) + ": " + damage.what());
+        note(block.offset,
+             "in the chunk, at its byte " + std::to_string(at) + ": " + damage.what());
       }
       // A record whose end is known is left out; otherwise the rest of the chunk is.
       if (in.position() <= at + kRecordHeaderBytes) break;
     }
   }
-  std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
-    return a.log_time_ns < b.log_time_ns;
-  });
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const Entry& a, const Entry& b) { return a.log_time_ns < b.log_time_ns; });
   return entries;
 }
 
@@ -215,8 +217,9 @@ bool McapReader::next(RecordedMessage& message) {
          (due_.empty() || blocks_[next_block_].start_ns <= due_.top().log_time_ns)) {
     if (!due_.empty() && loaded_bytes_ > limits_.loaded_bytes) {
       if (!told_overlap_) {
-        note(blocks_[next_block_].offset,
-             "more chunks overlap in time than are held at once; the order of messages is not kept");
+        note(
+            blocks_[next_block_].offset,
+            "more chunks overlap in time than are held at once; the order of messages is not kept");
       }
       told_overlap_ = true;
       break;

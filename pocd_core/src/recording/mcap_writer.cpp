@@ -74,8 +74,8 @@ void McapWriter::write(const MessageHeader& header, const std::uint8_t* data, st
   POCD_CHECK(open_);
   if (size > kLargestMessage) {
     throw InputError(channels_.at(header.channel).topic + ": message of " + std::to_string(size) +
-                     " bytes is larger than a recording takes (" +
-                     std::to_string(kLargestMessage) + ")");
+                     " bytes is larger than a recording takes (" + std::to_string(kLargestMessage) +
+                     ")");
   }
   if (!chunk_.empty() && chunk_.size() + size > options_.chunk_bytes) flush();
   define(header.channel);
@@ -149,7 +149,8 @@ void McapWriter::flush() {
 }
 
 std::uint64_t McapWriter::summary_bound() const {
-  // Definitions and chunk indexes as they are; statistics, offsets, footer and magic fit in the rest.
+  // Definitions and chunk indexes as they are; statistics, offsets, footer and magic fit in the
+  // rest.
   return definition_bytes_ + chunk_indexes_.size() + 10 * channels_.size() + 1024;
 }
 
@@ -167,7 +168,8 @@ void McapWriter::finish() {
   const auto group = [&](Opcode opcode, const auto& append) {
     const std::size_t begin = out.size();
     append();
-    if (out.size() > begin) append_summary_offset(offsets, opcode, base + begin, out.size() - begin);
+    if (out.size() > begin)
+      append_summary_offset(offsets, opcode, base + begin, out.size() - begin);
   };
   group(Opcode::kSchema, [&] {
     for (const SchemaRecord& schema : schemas_) append_schema(out, schema);

@@ -13,7 +13,7 @@ namespace {
 struct Sample {
   Bytes bytes;
   std::vector<Kept> kept;
-  std::vector<std::size_t> record_ends;     // in the file
+  std::vector<std::size_t> record_ends;  // in the file
   std::vector<std::size_t> chunk_offsets;
 };
 
@@ -56,7 +56,8 @@ std::size_t messages_before(const Sample& sample, std::size_t offset) {
   for (const std::size_t chunk : sample.chunk_offsets) {
     const auto end = *std::upper_bound(sample.record_ends.begin(), sample.record_ends.end(), chunk);
     if (end > offset) break;
-    ByteReader in(sample.bytes.data() + chunk + kRecordHeaderBytes, end - chunk - kRecordHeaderBytes);
+    ByteReader in(sample.bytes.data() + chunk + kRecordHeaderBytes,
+                  end - chunk - kRecordHeaderBytes);
     const ChunkHeader header = parse_chunk_header(in);
     for (const Kept& kept : sample.kept) {
       count += kept.log_time_ns >= header.start_ns && kept.log_time_ns <= header.end_ns;
@@ -168,8 +169,8 @@ TEST(McapDefects, AbsurdLengths) {
   for (const std::uint64_t length :
        {std::uint64_t{0}, std::uint64_t{1} << 20, std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
     Sample sample = make_sample("zstd");
-    put(sample.bytes, sample.chunk_offsets[2] + 1, length);           // of the record
-    sample.bytes.resize(sample.bytes.size() - 1);                     // and no footer
+    put(sample.bytes, sample.chunk_offsets[2] + 1, length);  // of the record
+    sample.bytes.resize(sample.bytes.size() - 1);            // and no footer
     McapReader reader = read_memory(sample.bytes);
     const std::vector<Kept> read = read_all(reader);
     EXPECT_TRUE(is_part_of(read, sample.kept));

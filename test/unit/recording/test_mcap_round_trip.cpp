@@ -79,12 +79,14 @@ TEST(McapReader, SeeksAndSelects) {
   writer.close();
   const auto reader = open_recording(folder / "a.mcap");
   reader->seek(2505);
-  auto from = std::find_if(kept.begin(), kept.end(), [](const Kept& k) { return k.log_time_ns >= 2505; });
+  auto from =
+      std::find_if(kept.begin(), kept.end(), [](const Kept& k) { return k.log_time_ns >= 2505; });
   EXPECT_TRUE(read_all(*reader) == std::vector<Kept>(from, kept.end()));
   reader->select([](const RecordedChannel& channel) { return channel.topic == "/b"; });
   reader->seek(0);
-  kept.erase(std::remove_if(kept.begin(), kept.end(), [](const Kept& k) { return k.topic != "/b"; }),
-             kept.end());
+  kept.erase(
+      std::remove_if(kept.begin(), kept.end(), [](const Kept& k) { return k.topic != "/b"; }),
+      kept.end());
   EXPECT_TRUE(read_all(*reader) == kept);
 }
 
@@ -105,7 +107,8 @@ TEST(McapWriter, RefusesWhatReadersWouldNotTake) {
   McapWriter writer(folder / "b.mcap");
   const std::uint16_t channel = writer.add_channel(0, "/a", "cdr", {});
   const std::uint8_t byte = 0;
-  EXPECT_THROW(writer.write({channel, 0, 0, 0}, &byte, McapWriter::kLargestMessage + 1), InputError);
+  EXPECT_THROW(writer.write({channel, 0, 0, 0}, &byte, McapWriter::kLargestMessage + 1),
+               InputError);
   EXPECT_THROW(McapWriter(folder / "no/such/folder.mcap"), InputError);
 }
 

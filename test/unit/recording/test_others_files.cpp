@@ -11,9 +11,9 @@ namespace {
 
 std::filesystem::path others() { return std::filesystem::path(POCD_TEST_DATA) / "recordings"; }
 
-#define NEEDS(file)                                             \
-  if (!std::filesystem::exists(file)) {                         \
-    GTEST_SKIP() << file << " is not here";                     \
+#define NEEDS(file)                         \
+  if (!std::filesystem::exists(file)) {     \
+    GTEST_SKIP() << file << " is not here"; \
   }
 
 TEST(OthersFiles, Rosbag2OdometryDecodes) {
@@ -62,8 +62,10 @@ TEST(OthersFiles, DamagedDatabasesAreNamed) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
   const char* setup =
-      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);"
-      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);"
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format "
+      "TEXT);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data "
+      "BLOB);"
       "INSERT INTO topics VALUES(7, '/a', 'std_msgs/msg/String', 'cdr');"
       "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 2000)"
       "INSERT INTO messages SELECT i, 7, 5000 - i, zeroblob(100) FROM n;";
@@ -81,7 +83,8 @@ TEST(OthersFiles, DamagedDatabasesAreNamed) {
   const Bytes good = file_bytes(file);
   const auto write = [&](const Bytes& bytes) {
     std::ofstream(file, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
   };
   Random random(11);
   for (int trial = 0; trial < 100; ++trial) {

@@ -1,4 +1,4 @@
-// Frames from files, in order. Implementations: torwic, rgbd, pcd; and the simulator.
+// Frames from files, in order. Implementations: torwic, rgbd, pcd, recordings; and the simulator.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "pocd/datasets/recording_options.hpp"
 #include "pocd/input/frame.hpp"
+#include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
 
@@ -19,14 +21,15 @@ struct CameraExtrinsics {
   Pose T_B_C = Pose::Identity();
 };
 
-/// What readers have in common. next() skips bad frames: each adds one line to `problems()` that names
-/// file (and line) and is counted; a source that cannot be read at all throws InputError from open.
+/// What readers have in common. next() skips bad frames: each adds one line to `problems()` that
+/// names file (and line) and is counted; a source that cannot be read at all throws InputError from
+/// open.
 class DatasetReader {
  public:
   virtual ~DatasetReader() = default;
 
-  /// The next good frame, or nothing at the end. Frame::sequence is the frame's number in the listing,
-  /// bad ones counted, so that a message can be traced to its file.
+  /// The next good frame, or nothing at the end. Frame::sequence is the frame's number in the
+  /// listing, bad ones counted, so that a message can be traced to its file.
   virtual std::optional<Frame> next() = 0;
   /// Number of frames the source lists (good or bad), 0 if not known.
   virtual std::size_t size() const = 0;
@@ -46,13 +49,14 @@ class DatasetReader {
 };
 
 struct DatasetOptions {
-  std::string format;  ///< "torwic", "rgbd", "pcd", "sim"
-  /// Visited in order as one run; stamps are shifted to go on. Folders, or scenario files for "sim".
+  std::string format;  ///< "torwic", "rgbd", "pcd", "sim", "mcap"
+  /// Visited in order as one run; stamps are shifted to go on. Folders, or scenario files for
+  /// "sim".
   std::vector<std::filesystem::path> inputs;
   int repeat = 1;               ///< frames made of each still image (pcd), >= 1
   double frame_rate_hz = 15.0;  ///< for sources without stamps
-  /// Unit vector pointing down in the source's world frame; frames are rotated so that it becomes -z.
-  /// Not given: the folder's gravity.txt (three numbers), or -z without one (rgbd).
+  /// Unit vector pointing down in the source's world frame; frames are rotated so that it becomes
+  /// -z. Not given: the folder's gravity.txt (three numbers), or -z without one (rgbd).
   std::optional<Eigen::Vector3d> gravity_W;
   std::uint64_t seed = 1;  ///< simulator noise
   /// Intrinsics of sources that do not bring their own (pcd), or other than TorWIC's (torwic).
@@ -61,10 +65,14 @@ struct DatasetOptions {
   std::optional<Pose> T_W_C;
   /// Camera on the robot (torwic); not given: TorWIC's front camera.
   std::optional<CameraExtrinsics> extrinsics;
-  /// Labels are class * label_divisor + instance for sources that know instances (pcd, sim); 1: class.
+  /// Labels are class * label_divisor + instance for sources that know instances (pcd, sim); 1:
+  /// class.
   int label_divisor = 1;
   std::string sensor;      ///< sim: "" as the scenario says, or "perfect", "stereo"
-  bool with_color = true;  ///< sim: colour images cost time
+  bool with_color = true;  ///< sim, mcap: colour images cost time
+  /// mcap: topics, and the colours of rgb8 masks.
+  RecordingOptions recording;
+  ClassMap classes;
 };
 
 /// Throws InputError: unknown format (listing the known ones), missing or empty folder, unreadable

@@ -13,8 +13,8 @@ namespace pocd::recording {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Bytes that do not mean what they should. what() says what is wrong; offset() where, counted from the
-/// start of the buffer that was read.
+/// Bytes that do not mean what they should. what() says what is wrong; offset() where, counted from
+/// the start of the buffer that was read.
 class DamagedData : public std::runtime_error {
  public:
   DamagedData(std::uint64_t offset, const std::string& what)
@@ -36,7 +36,8 @@ class ByteReader {
     need(sizeof(T));
     T value = 0;
     for (std::size_t i = 0; i < sizeof(T); ++i) {
-      value = static_cast<T>(value | static_cast<T>(static_cast<T>(data_[position_ + i]) << (8 * i)));
+      value =
+          static_cast<T>(value | static_cast<T>(static_cast<T>(data_[position_ + i]) << (8 * i)));
     }
     position_ += sizeof(T);
     return value;

@@ -1,4 +1,5 @@
-// Plain CDR (XCDR version 1, DDS-XTypes 1.3, 7.4.1) with its encapsulation header, without middleware.
+// Plain CDR (XCDR version 1, DDS-XTypes 1.3, 7.4.1) with its encapsulation header, without
+// middleware.
 #pragma once
 
 #include <cstring>
@@ -9,8 +10,8 @@
 
 namespace pocd::recording {
 
-/// Reads a payload in the order of its fields. Throws DamagedData rather than leave the buffer, which
-/// must outlive the reader.
+/// Reads a payload in the order of its fields. Throws DamagedData rather than leave the buffer,
+/// which must outlive the reader.
 class CdrReader {
  public:
   /// Refuses encapsulations other than plain CDR, little or big endian, by number.

@@ -10,9 +10,9 @@
 
 namespace pocd::recording {
 
-/// With a summary only chunks that are due are read. Without one, or with one that is damaged, the file
-/// is read through once; after a damaged record it goes on with the next chunk that looks like one. A
-/// chunk whose CRC does not fit is left out as a whole.
+/// With a summary only chunks that are due are read. Without one, or with one that is damaged, the
+/// file is read through once; after a damaged record it goes on with the next chunk that looks like
+/// one. A chunk whose CRC does not fit is left out as a whole.
 class McapReader : public RecordingReader {
  public:
   /// `name` begins every problem. Throws InputError when the source does not begin like MCAP.

@@ -11,13 +11,13 @@ namespace pocd::recording {
 class OutputFile;
 
 struct McapWriterOptions {
-  std::string compression = "zstd";  ///< "", "lz4" or "zstd"
-  int level = 1;                     ///< zstd's; 1 keeps up with cameras on one core
+  std::string compression = "zstd";    ///< "", "lz4" or "zstd"
+  int level = 1;                       ///< zstd's; 1 keeps up with cameras on one core
   std::size_t chunk_bytes = 4u << 20;  ///< a chunk is written when it holds that much
 };
 
-/// A chunk reaches the file whole and with every schema and channel it needs, in one write: whatever
-/// happens to the process, all chunks before it can be read. Not thread-safe.
+/// A chunk reaches the file whole and with every schema and channel it needs, in one write:
+/// whatever happens to the process, all chunks before it can be read. Not thread-safe.
 class McapWriter {
  public:
   /// Throws InputError: the file cannot be created, or an unknown compression.
@@ -34,8 +34,8 @@ class McapWriter {
   std::uint16_t add_channel(std::uint16_t schema, const std::string& topic,
                             const std::string& message_encoding,
                             const std::map<std::string, std::string>& metadata);
-  /// Throws InputError when the chunk cannot be written: the file is closed then, with an index of all
-  /// chunks before; or when the message is larger than readers take (kLargestMessage).
+  /// Throws InputError when the chunk cannot be written: the file is closed then, with an index of
+  /// all chunks before; or when the message is larger than readers take (kLargestMessage).
   void write(const MessageHeader& header, const std::uint8_t* data, std::size_t size);
   /// Writes what is held as a chunk; throws like write().
   void flush();

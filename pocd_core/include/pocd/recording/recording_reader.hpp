@@ -19,7 +19,7 @@ struct RecordedChannel {
   std::string schema_encoding;   ///< "ros2msg", "omgidl", ...; "" when there is no schema
   std::string schema;            ///< its text
   std::map<std::string, std::string> metadata;
-  std::uint64_t messages = 0;    ///< as the file says, or as found by reading it through
+  std::uint64_t messages = 0;  ///< as the file says, or as found by reading it through
 };
 
 struct RecordedMessage {
@@ -52,14 +52,16 @@ class RecordingReader {
 
   virtual const RecordingInfo& info() const = 0;
   virtual const std::vector<RecordedChannel>& channels() const = 0;
-  /// Next message in the order of log times (equal ones in the order of the file); false at the end.
+  /// Next message in the order of log times (equal ones in the order of the file); false at the
+  /// end.
   virtual bool next(RecordedMessage& message) = 0;
   /// Goes on with the first message at or after the log time; 0 is the start.
   virtual void seek(std::uint64_t log_time_ns) = 0;
   /// Leaves out other channels from now on; call it before next() or seek().
   void select(std::function<bool(const RecordedChannel&)> wanted) { wanted_ = std::move(wanted); }
 
-  /// One line each: file, offset, what is wrong. At most kMostProblems; problem_count() is not bounded.
+  /// One line each: file, offset, what is wrong. At most kMostProblems; problem_count() is not
+  /// bounded.
   const std::vector<std::string>& problems() const { return problems_; }
   std::uint64_t problem_count() const { return problem_count_; }
   static constexpr std::size_t kMostProblems = 100;
@@ -78,12 +80,12 @@ class RecordingReader {
 };
 
 struct ReaderLimits {
-  std::uint64_t chunk_bytes = 256u << 20;   ///< a larger chunk or message is not read
-  std::uint64_t loaded_bytes = 1024u << 20; ///< chunks that overlap in time, held at once
+  std::uint64_t chunk_bytes = 256u << 20;    ///< a larger chunk or message is not read
+  std::uint64_t loaded_bytes = 1024u << 20;  ///< chunks that overlap in time, held at once
 };
 
-/// By what the file begins with: MCAP, or SQLite for rosbag2's .db3. Throws InputError naming the file
-/// when it cannot be read at all or is neither.
+/// By what the file begins with: MCAP, or SQLite for rosbag2's .db3. Throws InputError naming the
+/// file when it cannot be read at all or is neither.
 std::unique_ptr<RecordingReader> open_recording(const std::filesystem::path& file,
                                                 const ReaderLimits& limits = {});
 

@@ -1,0 +1,49 @@
+// The streams of one robot of a recording, on their way to frames.
+#pragma once
+
+#include <set>
+
+#include "frame_inputs.hpp"
+#include "pocd/datasets/recording_options.hpp"
+#include "pocd/input/frame.hpp"
+#include "pocd/input/time_synchronizer.hpp"
+
+namespace pocd::recording {
+
+/// Which of the robot's streams the recording has.
+struct RecordedStreams {
+  bool segmentation = false;
+  bool color = false;
+};
+
+class RecordedRobot {
+ public:
+  RecordedRobot(const std::string& name, const RecordingOptions& options,
+                const RecordedStreams& streams);
+  RecordedRobot(const RecordedRobot&) = delete;
+  RecordedRobot& operator=(const RecordedRobot&) = delete;
+
+  /// Throw InputError for what cannot be used. Stamps are those of the run.
+  void add_image(TimeSynchronizer::Stream stream, StampNs stamp_ns, const std::string& frame_id,
+                 cv::Mat image);
+  void add_camera_info(StampNs stamp_ns, const CameraModel& camera);
+  void add_odometry(const RosTransform& transform);
+  void add_transform(const RosTransform& transform, bool is_static);
+
+  /// Frames that are ready, by stamp; a frame whose images disagree adds to `problems`.
+  std::vector<Frame> take(bool last_call, std::vector<std::string>& problems);
+  StampNs watermark_ns() const { return synchronizer_.watermark_ns(); }
+  /// "" or what the frames that were left out lacked.
+  std::string losses() const;
+  std::uint64_t dropped() const;
+
+ private:
+  std::string name_;
+  bool camera_frame_known_ = false;
+  TransformTree transforms_;
+  TimeSynchronizer synchronizer_;
+  std::set<std::string> odometry_children_;
+  std::uint64_t frames_ = 0;
+};
+
+}  // namespace pocd::recording

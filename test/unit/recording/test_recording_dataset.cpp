@@ -1,0 +1,229 @@
+#include <gtest/gtest.h>
+
+#include "pocd/common/check.hpp"
+#include "pocd/datasets/readers.hpp"
+#include "recordings.hpp"
+#include "ros_payloads.hpp"
+
+namespace pocd::recording {
+namespace {
+
+constexpr StampNs kPeriod = 100'000'000;
+const CameraModel kCamera{8, 6, 5, 5, 3.5, 2.5};
+
+PoseQuaternion pose_at(const std::string& robot, StampNs stamp_ns) {
+  PoseQuaternion T;
+  T.position = {static_cast<double>(stamp_ns) * 1e-9, robot == "a" ? 1.0 : 2.0, 0.0};
+  return T;
+}
+
+/// Two robots with 10 Hz cameras, half a period apart. Odometry comes a little after the images
+/// that it belongs to, so frames have to wait for it.
+class RecordedRun {
+ public:
+  explicit RecordedRun(const std::filesystem::path& file) : writer_(file) {
+    for (const std::string robot : {"a", "b"}) {
+      add_channel("/" + robot + "/depth/image_raw", "sensor_msgs/msg/Image");
+      add_channel("/" + robot + "/segmentation", "sensor_msgs/msg/Image");
+      add_channel("/" + robot + "/depth/camera_info", "sensor_msgs/msg/CameraInfo");
+      add_channel("/" + robot + "/odom", "nav_msgs/msg/Odometry");
+    }
+    add_channel("/tf_static", "tf2_msgs/msg/TFMessage");
+    add_channel("pocd/frames", "pocd_msgs/msg/FrameRecord");
+  }
+
+  void write(const std::string& topic, StampNs log_ns, const Bytes& payload) {
+    writer_.write({channels_.at(topic), 0, static_cast<std::uint64_t>(log_ns), 0}, payload.data(),
+                  payload.size());
+  }
+  void write_mounts(StampNs log_ns) {
+    PoseQuaternion mount;
+    mount.position = {0, 0, 0.5};
+    for (const std::string robot : {"a", "b"}) {
+      write("/tf_static", log_ns, tf_payload(0, robot + "/base", robot + "/camera", mount));
+    }
+  }
+  void write_frame(const std::string& robot, StampNs stamp_ns, bool with_labels = true) {
+    const cv::Mat depth(6, 8, CV_16UC1, cv::Scalar(1500));
+    const cv::Mat labels(6, 8, CV_8UC1, cv::Scalar(7));
+    const std::string camera = robot + "/camera";
+    write("/" + robot + "/depth/image_raw", stamp_ns,
+          image_payload(stamp_ns, camera, "16UC1", depth));
+    write("/" + robot + "/depth/camera_info", stamp_ns + 10,
+          camera_info_payload(stamp_ns, camera, kCamera));
+    if (with_labels) {
+      write("/" + robot + "/segmentation", stamp_ns + 30'000'000,
+            image_payload(stamp_ns, camera, "mono8", labels));
+    }
+    write("/" + robot + "/odom", stamp_ns + 40'000'000,
+          odometry_payload(stamp_ns, "map", robot + "/base", pose_at(robot, stamp_ns)));
+  }
+  void write_record(const std::string& robot, StampNs stamp_ns, std::uint64_t order, bool labels) {
+    CdrWriter out;
+    out.number(static_cast<std::int32_t>(stamp_ns / 1'000'000'000));
+    out.number(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
+    out.string(robot);
+    out.number(std::uint64_t{5});
+    out.number(order);
+    out.number(std::uint8_t{order == 0});
+    out.number(std::uint8_t{labels});
+    out.number(std::uint8_t{0});
+    write("pocd/frames", stamp_ns + 50'000'000, out.bytes());
+  }
+  McapWriter& writer() { return writer_; }
+
+ private:
+  void add_channel(const std::string& topic, const std::string& type) {
+    channels_[topic] =
+        writer_.add_channel(writer_.add_schema(type, "ros2msg", ""), topic, "cdr", {});
+  }
+  McapWriter writer_;
+  std::map<std::string, std::uint16_t> channels_;
+};
+
+std::vector<Frame> frames_of(DatasetReader& reader) {
+  std::vector<Frame> frames;
+  while (auto frame = reader.next()) frames.push_back(std::move(*frame));
+  return frames;
+}
+
+DatasetOptions options_for(std::vector<std::filesystem::path> inputs) {
+  DatasetOptions options;
+  options.format = "mcap";
+  options.inputs = std::move(inputs);
+  return options;
+}
+
+constexpr StampNs kStart = 5'000'000'000;
+
+void write_run(const std::filesystem::path& file, StampNs start_ns, int frames,
+               bool mounts = true) {
+  RecordedRun run(file);
+  if (mounts) run.write_mounts(start_ns - 1000);
+  for (int i = 0; i < frames; ++i) {
+    run.write_frame("b", start_ns + i * kPeriod);
+    run.write_frame("a", start_ns + i * kPeriod + kPeriod / 2);
+  }
+  run.writer().close();
+}
+
+TEST(RecordingDataset, MakesFramesOfAllRobotsInTheOrderOfStamps) {
+  const TemporaryFolder folder;
+  write_run(folder / "run.mcap", kStart, 20);
+  const auto reader = open_recorded(options_for({folder / "run.mcap"}));
+  EXPECT_EQ(reader->size(), 40u);
+  const std::vector<Frame> frames = frames_of(*reader);
+  EXPECT_TRUE(reader->problems().empty()) << reader->problems()[0];
+  ASSERT_EQ(frames.size(), 40u);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Frame& frame = frames[i];
+    EXPECT_EQ(frame.robot, i % 2 == 0 ? "b" : "a");
+    EXPECT_EQ(frame.stamp_ns, kStart + static_cast<StampNs>(i) * kPeriod / 2);
+    EXPECT_EQ(frame.sequence, i / 2);
+    EXPECT_FLOAT_EQ(frame.depth_m.at<float>(3, 3), 1.5f);
+    EXPECT_EQ(frame.labels.at<std::uint16_t>(3, 3), 7);
+    const Eigen::Vector3d expected =
+        pose_at(frame.robot, frame.stamp_ns).position + Eigen::Vector3d(0, 0, 0.5);
+    EXPECT_EQ(frame.T_W_C.translation(), expected);  // an exact stamp is not interpolated
+  }
+}
+
+TEST(RecordingDataset, GoesOnAcrossSplitsAndMovesLaterRuns) {
+  const TemporaryFolder folder;
+  write_run(folder / "run_0.mcap", kStart, 5);
+  write_run(folder / "run_1.mcap", kStart + 5 * kPeriod, 5, false);  // the mounts are in the first
+  const auto split = open_recorded(options_for({folder.path()}));
+  const std::vector<Frame> frames = frames_of(*split);
+  ASSERT_EQ(frames.size(), 20u);
+  EXPECT_EQ(frames.back().stamp_ns, kStart + 9 * kPeriod + kPeriod / 2);
+
+  write_run(folder / "other.mcap", kStart, 5);
+  const auto runs = open_recorded(options_for({folder / "run_0.mcap", folder / "other.mcap"}));
+  const std::vector<Frame> both = frames_of(*runs);
+  ASSERT_EQ(both.size(), 20u);
+  for (std::size_t i = 1; i < both.size(); ++i) EXPECT_GT(both[i].stamp_ns, both[i - 1].stamp_ns);
+  EXPECT_EQ(both[10].stamp_ns, both[9].stamp_ns + 1'000'000'000);
+}
+
+TEST(RecordingDataset, BadMessagesCostTheirFrameAndAreNamed) {
+  const TemporaryFolder folder;
+  RecordedRun run(folder / "run.mcap");
+  run.write_mounts(kStart - 1000);
+  for (int i = 0; i < 10; ++i) {
+    const StampNs stamp_ns = kStart + i * kPeriod;
+    if (i == 3) {
+      const cv::Mat depth(6, 8, CV_8UC3);
+      run.write("/a/depth/image_raw", stamp_ns, image_payload(stamp_ns, "a/camera", "rgb8", depth));
+    } else if (i == 4) {
+      run.write("/a/depth/image_raw", stamp_ns, Bytes{0, 1, 0, 0, 9, 9});
+    } else {
+      run.write_frame("a", stamp_ns, i != 6);
+    }
+    run.write_frame("b", stamp_ns);
+  }
+  run.writer().close();
+  const auto reader = open_recorded(options_for({folder / "run.mcap"}));
+  const std::vector<Frame> frames = frames_of(*reader);
+  EXPECT_EQ(frames.size(), 18u);
+  ASSERT_EQ(reader->problems().size(), 2u);
+  EXPECT_NE(reader->problems()[0].find("/a/depth/image_raw at 5300000000 ns: encoding \"rgb8\""),
+            std::string::npos);
+  EXPECT_NE(reader->problems()[1].find("bytes of payload are missing"), std::string::npos);
+  int without_labels = 0;
+  for (const Frame& frame : frames) without_labels += frame.labels.empty();
+  EXPECT_EQ(without_labels, 1);
+}
+
+TEST(RecordingDataset, AsLiveGivesWhatTheComponentTook) {
+  const TemporaryFolder folder;
+  RecordedRun run(folder / "run.mcap");
+  run.write_mounts(kStart - 1000);
+  std::vector<std::pair<std::string, StampNs>> expected;
+  for (int i = 0; i < 10; ++i) {
+    for (const std::string robot : {"a", "b"}) run.write_frame(robot, kStart + i * kPeriod);
+  }
+  // Two frames of a dropped, and one of b later than it should be.
+  std::uint64_t order = 0;
+  for (int i = 0; i < 10; ++i) {
+    const StampNs stamp_ns = kStart + i * kPeriod;
+    const bool dropped = i == 2 || i == 3;
+    run.write_record("a", stamp_ns, dropped ? 0 : ++order, i != 5);
+    if (!dropped) expected.emplace_back("a", stamp_ns);
+    const StampNs late_ns = i == 6 ? stamp_ns + kPeriod : i == 7 ? stamp_ns - kPeriod : stamp_ns;
+    run.write_record("b", late_ns, ++order, true);
+    expected.emplace_back("b", late_ns);
+  }
+  run.write_record("a", kStart + 99 * kPeriod, ++order, true);  // never recorded
+  run.writer().close();
+  DatasetOptions options = options_for({folder / "run.mcap"});
+  options.recording.as_live = true;
+  const auto reader = open_recorded(options);
+  const std::vector<Frame> frames = frames_of(*reader);
+  ASSERT_EQ(frames.size(), expected.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].robot, expected[i].first) << i;
+    EXPECT_EQ(frames[i].stamp_ns, expected[i].second) << i;
+    EXPECT_EQ(frames[i].labels.empty(),
+              frames[i].robot == "a" && frames[i].stamp_ns == kStart + 5 * kPeriod);
+  }
+  ASSERT_EQ(reader->problems().size(), 1u);
+  EXPECT_NE(reader->problems()[0].find("1 frames were processed live"), std::string::npos);
+
+  write_run(folder / "without.mcap", kStart, 3);
+  options.inputs = {folder / "without.mcap"};
+  EXPECT_THROW(open_recorded(options), InputError);
+}
+
+TEST(RecordingDataset, SaysWhatItLooksFor) {
+  const TemporaryFolder folder;
+  McapWriter(folder / "empty.mcap").close();
+  try {
+    open_recorded(options_for({folder / "empty.mcap"}));
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("/{robot}/depth/image_raw"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace pocd::recording
