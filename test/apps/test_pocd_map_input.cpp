@@ -153,7 +153,7 @@ TEST_F(PocdMapInput, PoseThatIsNoRotationIsSkipped) {
 
 TEST_F(PocdMapInput, MissingPoseIsSkipped) {
   std::filesystem::remove(frame_file(in_, 5, ".pose.txt"));
-  expect_one_skipped(run(), {"frame-000005.pose.txt"});
+  expect_one_skipped(run(), {"frame-000005", "pose"});
 }
 
 TEST_F(PocdMapInput, NoGoodFrameIsAFailure) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 namespace pocd::config_detail {
 namespace {
@@ -39,7 +40,11 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 std::string number_text(double value) {
   char buffer[32];
-  const auto result = std::to_chars(buffer, buffer + sizeof(buffer), value);
+  // Whole numbers as people write them: 100000, not 1e+05. (2^53 is the end of exact ones.)
+  const bool whole = std::abs(value) < 9e15 && value == std::floor(value) && !std::signbit(value);
+  const auto result =
+      whole ? std::to_chars(buffer, buffer + sizeof(buffer), value, std::chars_format::fixed)
+            : std::to_chars(buffer, buffer + sizeof(buffer), value);
   return std::string(buffer, result.ptr);
 }
 
@@ -54,9 +59,9 @@ std::optional<std::uint64_t> parse_natural(const std::string& text) {
 std::string unit_of(const std::string& doc) {
   const std::size_t close = doc.rfind(']');
   if (close == std::string::npos) return "";
-  const std::size_t open = doc.rfind('[', close);
+  const std::size_t open = doc.rfind(" [", close);  // with a space: E[v] is no unit
   if (open == std::string::npos) return "";
-  return doc.substr(open + 1, close - open - 1);
+  return doc.substr(open + 2, close - open - 2);
 }
 
 std::string range_text(const Range& range, const std::string& doc) {

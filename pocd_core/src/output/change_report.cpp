@@ -27,29 +27,51 @@ class Unclaimed {
   Unclaimed(const std::vector<ReportedEvent>& events, double radius_m)
       : events_(events), claimed_(events.size(), false), radius_m_(radius_m) {}
 
-  const ReportedEvent* claim(EventKind kind, const OrientedBox* before, const OrientedBox& box) {
-    for (std::size_t i = 0; i < events_.size(); ++i) {
-      const ReportedEvent& event = events_[i];
-      if (claimed_[i] || event.kind != kind || !near(event.position_W, box)) continue;
-      if (before && !(event.previous_W && near(*event.previous_W, *before))) continue;
-      claimed_[i] = true;
-      return &event;
-    }
-    return nullptr;
+  /// The first one that says exactly what the truth is.
+  const ReportedEvent* claim(const TruthChange& truth) {
+    return claim_if([&](const ReportedEvent& event) { return says(event, truth); });
   }
 
-  std::vector<std::string> rest() const {
+  /// The first one of any kind that is about one of the truth's places.
+  const ReportedEvent* claim_nearby(const TruthChange& truth) {
+    return claim_if([&](const ReportedEvent& event) {
+      return near(event.position_W, truth.before) || near(event.position_W, truth.after);
+    });
+  }
+
+  std::vector<std::string> rest() {
     std::vector<std::string> lines;
-    for (std::size_t i = 0; i < events_.size(); ++i) {
-      const bool is_change = events_[i].kind != EventKind::kUpdated;
-      if (is_change && !claimed_[i]) lines.push_back(describe(events_[i]));
-    }
+    const auto any = [](const ReportedEvent&) { return true; };
+    while (const ReportedEvent* event = claim_if(any)) lines.push_back(describe(*event));
     return lines;
   }
 
  private:
-  bool near(const Eigen::Vector3d& position_W, const OrientedBox& box) const {
-    return (position_W - box.pose.position_W).head<2>().norm() <= radius_m_;
+  template <class Condition>
+  const ReportedEvent* claim_if(const Condition& condition) {
+    for (std::size_t i = 0; i < events_.size(); ++i) {
+      if (claimed_[i] || events_[i].kind == EventKind::kUpdated || !condition(events_[i])) continue;
+      claimed_[i] = true;
+      return &events_[i];
+    }
+    return nullptr;
+  }
+
+  bool near(const Eigen::Vector3d& position_W, const std::optional<OrientedBox>& box) const {
+    return box && (position_W - box->pose.position_W).head<2>().norm() <= radius_m_;
+  }
+
+  bool says(const ReportedEvent& event, const TruthChange& truth) const {
+    switch (truth.kind) {
+      case ChangeKind::kAdded:
+        return event.kind == EventKind::kAdded && near(event.position_W, truth.after);
+      case ChangeKind::kRemoved:
+        return event.kind == EventKind::kRemoved && near(event.position_W, truth.before);
+      case ChangeKind::kMoved:
+        return event.kind == EventKind::kMoved && near(event.position_W, truth.after) &&
+               event.previous_W && near(*event.previous_W, truth.before);
+    }
+    return false;
   }
 
   const std::vector<ReportedEvent>& events_;
@@ -57,59 +79,66 @@ class Unclaimed {
   double radius_m_;
 };
 
-ChangeRow compare(const std::string& visit, const TruthChange& change, Unclaimed& events) {
-  ChangeRow row;
-  row.visit = visit;
-  row.truth = std::string(to_string(change.kind)) + " " + change.name + " ";
-  const ReportedEvent* event = nullptr;
-  switch (change.kind) {
-    case ChangeKind::kAdded:
-      row.truth += place(change.after->pose.position_W);
-      event = events.claim(EventKind::kAdded, nullptr, *change.after);
-      break;
-    case ChangeKind::kRemoved:
-      row.truth += place(change.before->pose.position_W);
-      event = events.claim(EventKind::kRemoved, nullptr, *change.before);
-      break;
-    case ChangeKind::kMoved: {
-      row.truth +=
-          place(change.before->pose.position_W) + " -> " + place(change.after->pose.position_W);
-      event = events.claim(EventKind::kMoved, &*change.before, *change.after);
-      if (event) break;
-      const ReportedEvent* gone = events.claim(EventKind::kRemoved, nullptr, *change.before);
-      const ReportedEvent* come = events.claim(EventKind::kAdded, nullptr, *change.after);
-      if (gone) row.reported = describe(*gone);
-      if (come) row.reported += (gone ? ", " : "") + describe(*come);
-      break;
+struct Truth {
+  std::string visit;
+  TruthChange change;
+};
+
+/// The objects of the first visit as additions, then every change.
+std::vector<Truth> truths_of(const Scenario& scenario) {
+  std::vector<Truth> truths;
+  for (const TruthObject& object : objects_after(scenario, 0)) {
+    TruthChange first;
+    first.name = object.name;
+    first.after = object.box;
+    truths.push_back({scenario.visits[0].name, first});
+  }
+  for (std::size_t visit = 1; visit < scenario.visits.size(); ++visit) {
+    for (const TruthChange& change : changes_of(scenario, visit)) {
+      truths.push_back({scenario.visits[visit].name, change});
     }
   }
-  if (event) row.reported = describe(*event), row.right = true;
-  return row;
+  return truths;
+}
+
+std::string describe(const TruthChange& change) {
+  std::string text = std::string(to_string(change.kind)) + " " + change.name + " ";
+  if (change.before) text += place(change.before->pose.position_W);
+  if (change.before && change.after) text += " -> ";
+  if (change.after) text += place(change.after->pose.position_W);
+  return text;
 }
 
 }  // namespace
 
 ChangeReport compare_changes(const Scenario& scenario, const std::vector<ReportedEvent>& events,
                              double radius_m) {
-  ChangeReport report;
+  const std::vector<Truth> truths = truths_of(scenario);
   Unclaimed unclaimed(events, radius_m);
-  for (const TruthObject& object : objects_after(scenario, 0)) {
-    TruthChange first;
-    first.name = object.name;
-    first.after = object.box;
-    report.rows.push_back(compare(scenario.visits[0].name, first, unclaimed));
+  ChangeReport report;
+  for (const Truth& truth : truths) {
+    ChangeRow row{truth.visit, describe(truth.change), "", false};
+    if (const ReportedEvent* event = unclaimed.claim(truth.change)) {
+      row.reported = describe(*event);
+      row.right = true;
+    }
+    report.rows.push_back(row);
   }
-  const std::size_t first_changes = report.rows.size();
-  for (std::size_t visit = 1; visit < scenario.visits.size(); ++visit) {
-    for (const TruthChange& change : changes_of(scenario, visit)) {
-      report.rows.push_back(compare(scenario.visits[visit].name, change, unclaimed));
+  // Only now: what is not exactly right must not take an event that is right about another truth.
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    ChangeRow& row = report.rows[i];
+    const bool is_move = truths[i].change.kind == ChangeKind::kMoved;
+    for (int left = row.right ? 0 : is_move ? 2 : 1; left > 0; --left) {
+      const ReportedEvent* event = unclaimed.claim_nearby(truths[i].change);
+      if (event) row.reported += (row.reported.empty() ? "" : ", ") + describe(*event);
     }
   }
-  report.changes = report.rows.size() - first_changes;
-  report.right_changes = static_cast<std::size_t>(
-      std::count_if(report.rows.begin() + static_cast<std::ptrdiff_t>(first_changes),
-                    report.rows.end(), [](const ChangeRow& row) { return row.right; }));
   report.false_reports = unclaimed.rest();
+  const std::size_t first_visit = objects_after(scenario, 0).size();
+  report.changes = report.rows.size() - first_visit;
+  for (std::size_t i = first_visit; i < report.rows.size(); ++i) {
+    report.right_changes += report.rows[i].right ? 1 : 0;
+  }
   return report;
 }
 

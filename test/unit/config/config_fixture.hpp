@@ -17,6 +17,7 @@ namespace pocd {
 /// Every kind of parameter that a describe() can have.
 struct AllKinds {
   double real = 0.5;
+  double share = 0.5;
   int whole = -3;
   std::uint64_t natural = 7;
   bool flag = false;
@@ -34,6 +35,7 @@ struct AllKinds {
   template <class Visitor>
   void describe(Visitor& visit) {
     visit("real", real, Range{-1e308, 1e308}, "A real number [m].");
+    visit("share", share, Range{0, 100000}, "The mean E[v].");
     visit("whole", whole, Range{-100, 100}, "A whole number.");
     visit("natural", natural, Range{0, 1.9e19}, "A natural number.");
     visit("flag", flag, "A switch.");

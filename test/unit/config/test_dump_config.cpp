@@ -62,6 +62,7 @@ TEST(ParametersMarkdown, HasEveryParameterWithDefaultRangeAndMeaning) {
             std::string::npos);
   EXPECT_NE(page.find("| `word` | `red` | red, green | One of \\| two words. |\n"),
             std::string::npos);
+  EXPECT_NE(page.find("| `share` | `0.5` | 0 to 100000 | The mean E[v]. |\n"), std::string::npos);
   EXPECT_NE(page.find("\n## noise\n\nA group.\n\n| parameter |"), std::string::npos);
   EXPECT_NE(page.find("| `noise.base_m` | `0.004` | 0 to 0.2 m |"), std::string::npos);
   EXPECT_NE(page.find("\n## items[]\n\nEach entry of `items`."), std::string::npos);

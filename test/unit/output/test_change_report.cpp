@@ -62,11 +62,30 @@ TEST_F(ChangeReportTest, MissedChangeIsNothing) {
   EXPECT_NE(format_report(report).find("nothing"), std::string::npos);
 }
 
-TEST_F(ChangeReportTest, EventOutsideTheRadiusIsWrongTwice) {
-  events_[moved_].position_W.x() += 0.31;
+TEST_F(ChangeReportTest, EventFarFromTheTruthIsWrongTwice) {
+  events_[moved_].position_W.x() = events_[moved_].previous_W->x() + 9.0;
   const ChangeReport report = compare();
   EXPECT_EQ(report.right_changes, report.changes - 1);
   EXPECT_EQ(report.false_reports.size(), 1u);
+}
+
+TEST_F(ChangeReportTest, RadiusIsTheLimit) {
+  const double y = events_[moved_].position_W.y();
+  events_[moved_].position_W.y() = y + 0.299;
+  EXPECT_EQ(compare().right_changes, compare().changes);
+  events_[moved_].position_W.y() = y + 0.301;
+  EXPECT_EQ(compare().right_changes, compare().changes - 1);
+}
+
+TEST_F(ChangeReportTest, EventOfAnotherKindNearByIsShownButNotRight) {
+  for (ReportedEvent& event : events_) {
+    if (event.kind != EventKind::kRemoved) continue;
+    event.kind = EventKind::kMoved;
+    break;
+  }
+  const ChangeReport report = compare();
+  EXPECT_EQ(report.right_changes, report.changes - 1);
+  EXPECT_TRUE(report.false_reports.empty());
 }
 
 TEST_F(ChangeReportTest, InventedEventIsFalseAndUpdatesAreNot) {

@@ -37,9 +37,9 @@ struct ChangeReport {
   std::size_t right_changes = 0;  ///< of those
 };
 
-/// Pairs each truth with the first unused event of its kind, in order, whose place is within
-/// `radius_m` horizontally of the true one (MOVED: both places). A move reported as REMOVED and
-/// ADDED is shown, but not right.
+/// A truth is rightly reported by the first unused event of its kind whose place is within `radius_m`
+/// horizontally of the true one (MOVED: both places). For the others the row shows one unused event of
+/// any kind near by (two for a move, so REMOVED and ADDED), which does not make it right.
 ChangeReport compare_changes(const Scenario& scenario, const std::vector<ReportedEvent>& events,
                              double radius_m);
 
