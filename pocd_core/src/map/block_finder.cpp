@@ -59,7 +59,8 @@ void BlockFinder::scan(const TsdfConfig& config, const IntegrationInput& input, 
   if (marks_.size() < cells) marks_ = std::vector<std::atomic<std::uint8_t>>(cells * 3 / 2);
   for (std::size_t i = 0; i < cells; ++i) marks_[i].store(0, std::memory_order_relaxed);
 
-  // At least three samples across a block at the depth limit.
+  // At least three samples across a block at the depth limit. A block that fewer pixels see, at the
+  // image border or an outline, may be found only in a later frame.
   const CameraModel& camera = input.frame->camera;
   const double block_px = block_m_ * std::min(camera.fx, camera.fy) / config.max_depth_m;
   step_px_ = block_px >= 12.0 ? 4 : block_px >= 6.0 ? 2 : 1;
@@ -170,8 +171,8 @@ float BlockFinder::farthest_depth(const Eigen::Vector3d& center_C, double radius
   return far_depth;
 }
 
-void BlockFinder::append_in_free_space(BlockStore& store, std::uint64_t stamp,
-                                       std::vector<std::uint32_t>& slots) const {
+void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp,
+                              std::vector<std::uint32_t>& slots) const {
   const Pose T_C_W = input_->frame->T_W_C.inverse();
   constexpr int kShift = BlockStore::kRegionShift;
   const double block_radius = 0.5 * std::sqrt(3.0) * block_m_;
@@ -193,7 +194,7 @@ void BlockFinder::append_in_free_space(BlockStore& store, std::uint64_t stamp,
               (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * block_m_;
           const Eigen::Vector3d block_C = T_C_W * block_W;
           const float far = farthest_depth(block_C, block_radius);
-          if (far > 0.0f && block_C.z() - half_z < far - truncation && store.visit(slot, stamp)) {
+          if (far > 0.0f && block_C.z() - half_z < far + truncation && store.visit(slot, stamp)) {
             slots.push_back(slot);
           }
         }

@@ -24,10 +24,10 @@ class BlockFinder {
   /// Keys of the marked cells, canonical order.
   const std::vector<BlockKey>& band();
 
-  /// Allocated blocks not yet visited with `stamp` that reach into the space that the frame saw to
-  /// be free; visits them.
-  void append_in_free_space(BlockStore& store, std::uint64_t stamp,
-                            std::vector<std::uint32_t>& slots) const;
+  /// Allocated blocks not yet visited with `stamp` that reach into the space that the frame saw,
+  /// free or within the band (the sampled rays miss blocks of which they would cut only a corner);
+  /// visits them.
+  void append_seen(BlockStore& store, std::uint64_t stamp, std::vector<std::uint32_t>& slots) const;
 
  private:
   static constexpr int kTile_px = 16;

@@ -12,13 +12,19 @@ MapDigest map_digest(const std::vector<MapTile>& tiles) {
   return sum;
 }
 
+void MapReplica::hear(std::uint64_t epoch, std::uint64_t version) {
+  if (epoch == *epoch_) {
+    newest_ = std::max(newest_, version);
+  } else {
+    other_newest_ = other_epoch_ == epoch ? std::max(other_newest_, version) : version;
+    other_epoch_ = epoch;
+  }
+}
+
 DeltaOutcome MapReplica::apply(const MapDelta& delta) {
   if (!epoch_) epoch_ = delta.epoch;
-  if (delta.epoch != *epoch_) {
-    other_epoch_ = delta.epoch;
-    return DeltaOutcome::kWrongEpoch;
-  }
-  newest_ = std::max(newest_, delta.version);
+  hear(delta.epoch, delta.version);
+  if (delta.epoch != *epoch_) return DeltaOutcome::kWrongEpoch;
   if (corrupt_) return DeltaOutcome::kCorrupt;
   if (delta.version <= version_) return DeltaOutcome::kOld;
   if (delta.base_version != version_) return DeltaOutcome::kGap;
@@ -43,12 +49,8 @@ DeltaOutcome MapReplica::apply(const MapDelta& delta) {
 void MapReplica::note_published(std::uint64_t epoch, std::uint64_t version,
                                 const MapDigest& digest) {
   if (!epoch_) epoch_ = epoch;
-  if (epoch != *epoch_) {
-    other_epoch_ = epoch;
-    return;
-  }
-  newest_ = std::max(newest_, version);
-  if (version == version_ && digest != digest_) corrupt_ = true;
+  hear(epoch, version);
+  if (epoch == *epoch_ && version == version_ && digest != digest_) corrupt_ = true;
 }
 
 bool MapReplica::replace(std::uint64_t epoch, std::uint64_t version, const MapDigest& digest,
@@ -63,7 +65,8 @@ bool MapReplica::replace(std::uint64_t epoch, std::uint64_t version, const MapDi
   MapDigest sum;
   for (const auto& [key, tile] : by_key) add(sum, tile_digest(key, tile.payload));
   if (sum != digest) return false;
-  newest_ = same_run ? std::max(newest_, version) : version;
+  if (!same_run) newest_ = other_epoch_ == epoch ? other_newest_ : 0;
+  newest_ = std::max(newest_, version);
   epoch_ = epoch;
   other_epoch_.reset();
   version_ = version;

@@ -20,8 +20,8 @@ int edge_between(int a, int b) {
   return kNone;
 }
 
-// Walking around a face, the surface line of a run of inside corners starts at the edge that leaves
-// the run and ends at the edge that entered it. An edge left on one face is entered on the other
+// Walking around a face, the surface line of a run of inside corners starts at the edge that enters
+// the run and ends at the edge that leaves it. An edge left on one face is entered on the other
 // face it belongs to, so the lines join to closed loops.
 std::array<int, 12> surface_lines(int inside) {
   std::array<int, 12> next;
@@ -33,7 +33,7 @@ std::array<int, 12> surface_lines(int inside) {
       if (!enters) continue;
       int j = (i + 1) % 4;
       while (inside >> face[(j + 1) % 4] & 1) j = (j + 1) % 4;
-      next[edge_between(face[j], face[(j + 1) % 4])] = edge_between(a, b);
+      next[edge_between(a, b)] = edge_between(face[j], face[(j + 1) % 4]);
     }
   }
   return next;

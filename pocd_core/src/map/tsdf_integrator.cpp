@@ -71,7 +71,7 @@ void TsdfIntegrator::integrate(const TsdfConfig& config, const IntegrationInput&
     store.visit(slot, stamp_);
     slots_.push_back(slot);
   }
-  finder_.append_in_free_space(store, stamp_, slots_);
+  finder_.append_seen(store, stamp_, slots_);
 
   outcomes_.resize(slots_.size());
   const Pose T_C_W = input.frame->T_W_C.inverse();

@@ -48,8 +48,11 @@ class MapReplica {
   const std::map<TileKey, MapTile>& tiles() const { return tiles_; }
 
  private:
+  void hear(std::uint64_t epoch, std::uint64_t version);
+
   std::optional<std::uint64_t> epoch_;
   std::optional<std::uint64_t> other_epoch_;  // heard of, not ours
+  std::uint64_t other_newest_ = 0;            // version heard of in that one
   std::uint64_t version_ = 0;
   std::uint64_t newest_ = 0;  // version heard of in our epoch
   bool corrupt_ = false;

@@ -1,0 +1,192 @@
+#include "pocd/map/birdseye.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "birdseye_canvas.hpp"
+#include "pocd/common/check.hpp"
+
+namespace pocd {
+namespace {
+
+constexpr float kNothing = -1e9f;
+const cv::Scalar kOutline(60, 56, 52);
+
+// Height below which 2 % of the vertices lie; 0 for an empty mesh.
+double ground_height(const Mesh& mesh) {
+  if (mesh.vertices_W.empty()) return 0.0;
+  std::vector<float> heights;
+  heights.reserve(mesh.vertices_W.size());
+  for (const Eigen::Vector3f& p : mesh.vertices_W) heights.push_back(p.z());
+  const auto at = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
+  std::nth_element(heights.begin(), at, heights.end());
+  return *at;
+}
+
+std::array<Eigen::Vector2d, 4> corners(const OrientedBox& box) {
+  const double c = std::cos(box.pose.yaw_rad), s = std::sin(box.pose.yaw_rad);
+  const Eigen::Vector2d along = 0.5 * box.size_m.x() * Eigen::Vector2d(c, s);
+  const Eigen::Vector2d across = 0.5 * box.size_m.y() * Eigen::Vector2d(-s, c);
+  const Eigen::Vector2d center = box.pose.position_W.head<2>();
+  return {center + along + across, center - along + across, center - along - across,
+          center + along - across};
+}
+
+// Area to show: everything drawn, with a margin.
+void find_area(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects, double lowest,
+               double highest, Eigen::Vector2d& low, Eigen::Vector2d& high) {
+  low.setConstant(1e9);
+  high.setConstant(-1e9);
+  for (const Eigen::Vector3f& p : mesh.vertices_W) {
+    if (p.z() < lowest || p.z() > highest) continue;
+    low = low.cwiseMin(p.head<2>().cast<double>());
+    high = high.cwiseMax(p.head<2>().cast<double>());
+  }
+  for (const ObjectSnapshot& object : objects) {
+    for (const Eigen::Vector2d& corner : corners(object.box)) {
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
+    }
+  }
+  if (low.x() > high.x()) low.setConstant(-1.0), high.setConstant(1.0);
+  const double margin = std::max(0.03 * (high - low).maxCoeff(), 0.05);
+  low.array() -= margin;
+  high.array() += margin;
+}
+
+// The highest surface over every pixel.
+struct TopView {
+  cv::Mat1f height;
+  cv::Mat1i triangle;
+};
+
+void rasterise(const Mesh& mesh, const BirdseyeCanvas& canvas, double lowest, double highest,
+               TopView& view) {
+  const cv::Rect plot = canvas.plot();
+  view.height = cv::Mat1f(plot.size(), kNothing);
+  view.triangle = cv::Mat1i(plot.size(), -1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    cv::Point2d p[3];
+    double z[3];
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3f& v = mesh.vertices_W[mesh.triangles[t][i]];
+      p[i] = canvas.to_pixel(v.x(), v.y()) - cv::Point2d(plot.x, plot.y);
+      z[i] = v.z();
+    }
+    if (std::min({z[0], z[1], z[2]}) < lowest || std::max({z[0], z[1], z[2]}) > highest) continue;
+    const double area = (p[1] - p[0]).cross(p[2] - p[0]);
+    const int left = std::max(0, cvFloor(std::min({p[0].x, p[1].x, p[2].x})));
+    const int right = std::min(plot.width - 1, cvFloor(std::max({p[0].x, p[1].x, p[2].x})));
+    const int top = std::max(0, cvFloor(std::min({p[0].y, p[1].y, p[2].y})));
+    const int bottom = std::min(plot.height - 1, cvFloor(std::max({p[0].y, p[1].y, p[2].y})));
+    for (int y = top; y <= bottom; ++y) {
+      for (int x = left; x <= right; ++x) {
+        // A wall seen from above has no area: it is drawn one pixel wide, at its highest point.
+        double height = std::max({z[0], z[1], z[2]});
+        if (std::abs(area) > 0.5) {
+          const cv::Point2d q(x + 0.5, y + 0.5);
+          const double a = (p[1] - q).cross(p[2] - q) / area, b = (p[2] - q).cross(p[0] - q) / area;
+          if (a < -0.01 || b < -0.01 || a + b > 1.01) continue;
+          height = a * z[0] + b * z[1] + (1.0 - a - b) * z[2];
+        }
+        if (height <= view.height(y, x)) continue;
+        view.height(y, x) = static_cast<float>(height);
+        view.triangle(y, x) = static_cast<int>(t);
+      }
+    }
+  }
+}
+
+void paint(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects, const TopView& view,
+           double ground, const BirdseyeOptions& options, BirdseyeCanvas& canvas) {
+  std::map<std::uint32_t, double> score;
+  for (const ObjectSnapshot& o : objects) score[to_index(o.id)] = o.belief.stationarity();
+  cv::Mat plot = canvas.image()(canvas.plot());
+  for (int y = 0; y < plot.rows; ++y) {
+    for (int x = 0; x < plot.cols; ++x) {
+      const int t = view.triangle(y, x);
+      if (t < 0) continue;
+      const double above = view.height(y, x) - ground;
+      // Higher is darker, so that walls stand out from what lies below them.
+      const double shade = std::clamp(above / options.highest_m, 0.0, 1.0);
+      const auto grey =
+          static_cast<std::uint8_t>(above < options.ground_m ? 234 : 205 - 75 * shade);
+      cv::Vec3b color(grey, grey, grey);
+      const auto known = score.find(mesh.owner[mesh.triangles[static_cast<std::size_t>(t)][0]]);
+      if (known != score.end()) {
+        const auto c = stationarity_color(known->second);
+        for (int i = 0; i < 3; ++i) {
+          color[i] = static_cast<std::uint8_t>(c[i] * (0.82 + 0.18 * shade) + 30 * (1.0 - shade));
+        }
+      }
+      plot.at<cv::Vec3b>(y, x) = color;
+    }
+  }
+}
+
+void outline(const std::vector<ObjectSnapshot>& objects, BirdseyeCanvas& canvas) {
+  constexpr int kShift = 4;  // fractional bits of the polygon's corners
+  for (const ObjectSnapshot& object : objects) {
+    std::vector<cv::Point> polygon;
+    for (const Eigen::Vector2d& corner : corners(object.box)) {
+      const cv::Point2d p = canvas.to_pixel(corner.x(), corner.y()) * (1 << kShift);
+      polygon.emplace_back(cvRound(p.x), cvRound(p.y));
+    }
+    cv::polylines(canvas.image(), polygon, true, kOutline, 1, cv::LINE_AA, kShift);
+  }
+  // Labels last, so that no outline crosses them.
+  for (const ObjectSnapshot& object : objects) {
+    const Eigen::Vector3d& center = object.box.pose.position_W;
+    canvas.label(std::to_string(to_index(object.id)), canvas.to_pixel(center.x(), center.y()),
+                 0.42);
+  }
+}
+
+}  // namespace
+
+std::array<std::uint8_t, 3> stationarity_color(double score) {
+  constexpr double kRamp[3][3] = {{52, 58, 210}, {62, 196, 246}, {84, 158, 46}};  // BGR
+  const double s = 2.0 * std::clamp(score, 0.0, 1.0);
+  const int part = s < 1.0 ? 0 : 1;
+  std::array<std::uint8_t, 3> color;
+  for (int i = 0; i < 3; ++i) {
+    color[i] = static_cast<std::uint8_t>(
+        std::lround(kRamp[part][i] + (s - part) * (kRamp[part + 1][i] - kRamp[part][i])));
+  }
+  return color;
+}
+
+cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
+                      const BirdseyeOptions& options) {
+  POCD_CHECK(options.size_px >= 400);
+  const double ground = ground_height(mesh);
+  const double lowest = ground + options.lowest_m, highest = ground + options.highest_m;
+  Eigen::Vector2d low, high;
+  find_area(mesh, objects, lowest, highest, low, high);
+  BirdseyeCanvas canvas(low, high, options.size_px);
+  canvas.draw_grid();
+  TopView view;
+  rasterise(mesh, canvas, lowest, highest, view);
+  paint(mesh, objects, view, ground, options, canvas);
+  outline(objects, canvas);
+  canvas.decorate(options.title,
+                  std::to_string(objects.size()) + (objects.size() == 1 ? " object" : " objects"));
+  return canvas.image();
+}
+
+void write_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
+                    const std::filesystem::path& file, const BirdseyeOptions& options) {
+  const cv::Mat picture = draw_birdseye(mesh, objects, options);
+  bool written = false;
+  try {
+    written = cv::imwrite(file.string(), picture);
+  } catch (const cv::Exception&) {
+    written = false;  // an unknown extension; reported like every other failure
+  }
+  if (!written) throw InputError(file.string() + ": picture cannot be written");
+}
+
+}  // namespace pocd

@@ -1,0 +1,203 @@
+// What happens to the map when the world changes: carving, clearing, change of owner.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "map_fixtures.hpp"
+#include "pocd/map/mesh.hpp"
+
+namespace pocd::testing {
+namespace {
+
+constexpr int kFree = 29490;  // stored distance from which a voxel is free space
+
+std::size_t count_owned(const TsdfMap& map, std::uint32_t owner) {
+  std::size_t count = 0;
+  for (const BlockKey& key : map.sorted_keys()) {
+    for (const std::uint32_t o : map.find(key)->owner) count += o == owner;
+  }
+  return count;
+}
+
+// Surface voxels (observed, not free) nearer than y.
+int surface_before(const TsdfMap& map, double y_m) {
+  int count = 0;
+  for (const BlockKey& key : map.sorted_keys()) {
+    const VoxelBlock& block = *map.find(key);
+    for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+      count += block.weight[v] > 0 && block.tsdf[v] < kFree &&
+               voxel_center(key, v, map.config().voxel_size_m).y() < y_m;
+    }
+  }
+  return count;
+}
+
+TEST(TsdfChange, VanishedWallIsCarvedInAFewFramesEvenAtFullWeight) {
+  ThreadPool pool(1);
+  TsdfMap map(coarse_config());  // weight cap 100
+  const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+  for (int i = 0; i < 120; ++i) map.integrate(look({1.5, {}}, pose).input(), pool);
+  ASSERT_GT(surface_before(map, 1.8), 1000);
+  map.take_dirty();
+  // The weight is halved by each contradiction: log2(100) + 1 = 7 frames empty a voxel.
+  for (int i = 0; i < 7; ++i) map.integrate(look({3.0, {}}, pose).input(), pool);
+  EXPECT_EQ(surface_before(map, 1.65), 0);
+  const std::vector<BlockKey> dirty = map.take_dirty();
+  int dropped = 0;
+  for (const BlockKey& key : dirty) dropped += map.find(key) == nullptr;
+  EXPECT_GT(dropped, 0);  // blocks that hold free space only are gone, and announced
+}
+
+TEST(TsdfChange, OneWrongFrameErasesNothing) {
+  ThreadPool pool(1);
+  TsdfMap map(coarse_config());
+  const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+  for (int i = 0; i < 120; ++i) map.integrate(look({1.5, {}}, pose).input(), pool);
+  const Mesh before = extract_mesh(map, 2, pool);
+  map.integrate(look({3.0, {}}, pose).input(), pool);
+  const Mesh after = extract_mesh(map, 2, pool);
+  // Not a triangle is lost, and the surface moves by one part in 51 of the truncation at most: 4
+  // mm.
+  double moved = 0.0;
+  std::size_t kept = 0;
+  for (const Eigen::Vector3f& p : after.vertices_W) {
+    if (p.y() > 2.0f) continue;
+    moved = std::max(moved, std::abs(p.y() - 1.5));
+    ++kept;
+  }
+  EXPECT_GE(kept, before.vertices_W.size());
+  EXPECT_LT(moved, 0.0045);
+}
+
+TEST(TsdfChange, MissingDepthErasesNothing) {
+  ThreadPool pool(1);
+  TsdfMap map(coarse_config());
+  View view = look({1.5, {}}, camera_pose({0, 0, 1}, 0, 0));
+  map.integrate(view.input(), pool);
+  const int before = surface_before(map, 2.0);
+  view.frame.depth_m.setTo(0.0);
+  for (int i = 0; i < 20; ++i) map.integrate(view.input(), pool);
+  view.frame.depth_m.setTo(std::numeric_limits<float>::quiet_NaN());
+  for (int i = 0; i < 20; ++i) map.integrate(view.input(), pool);
+  EXPECT_EQ(surface_before(map, 2.0), before);
+}
+
+// A thin bar two pixels wide before a wall, seen with a pose that wavers by half a pixel (3 mm at
+// 1 m): the rays just beside it must not eat it.
+TEST(TsdfChange, ThinThingsSurviveSmallPoseErrors) {
+  ThreadPool pool(1);
+  TsdfConfig config = coarse_config();
+  config.voxel_size_m = 0.01;
+  TsdfMap map(config);
+  Random random(3);
+  std::size_t owned_early = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+    View view = look({2.5, {}}, pose);
+    const int left = random.uniform() < 0.5 ? 80 : 81;
+    for (int v = 0; v < 120; ++v) {
+      for (int u = left; u < left + 3; ++u) {
+        view.frame.depth_m.at<float>(v, u) = 1.0f;
+        view.owners[v * 160 + u] = 5;
+      }
+    }
+    map.integrate(view.input(), pool);
+    if (i == 9) owned_early = count_owned(map, 5);
+  }
+  ASSERT_GT(owned_early, 0u);
+  EXPECT_GE(count_owned(map, 5), owned_early * 9 / 10);
+}
+
+// Free space has a small weight, so that a thing put there appears within about as many frames.
+TEST(TsdfChange, NewThingAppearsInSpaceKnownToBeFree) {
+  ThreadPool pool(1);
+  TsdfMap map(coarse_config());
+  const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+  for (int i = 0; i < 120; ++i) map.integrate(look({2.5, {}}, pose).input(), pool);
+  const Scene with_ball{2.5, {{{0.0, 1.5, 1.0}, 0.4, 6}}};
+  for (int i = 0; i < 4; ++i) map.integrate(look(with_ball, pose).input(), pool);
+  const Mesh mesh = extract_mesh(map, 2, pool);
+  int ball = 0;
+  for (const Eigen::Vector3f& p : mesh.vertices_W) ball += p.y() < 1.5f;
+  EXPECT_GT(ball, 100);
+}
+
+class ClearObject : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Scene scene{2.5, {{{-0.4, 1.5, 1.0}, 0.3, 3}, {{0.3, 1.4, 0.9}, 0.25, 9}}};
+    for (const Pose& pose : arc_of_poses(20, 2)) map.integrate(look(scene, pose).input(), pool);
+    ASSERT_GT(count_owned(map, 3), 100u);
+    ASSERT_GT(count_owned(map, 9), 100u);
+    map.take_dirty();
+  }
+  ThreadPool pool{1};
+  TsdfMap map{coarse_config()};
+};
+
+TEST_F(ClearObject, ResetsExactlyTheOwnersVoxels) {
+  std::map<BlockKey, VoxelBlock> before;
+  for (const BlockKey& key : map.sorted_keys()) before[key] = *map.find(key);
+  const std::size_t owned = count_owned(map, 3);
+  EXPECT_EQ(map.clear_object(ObjectId{3}), owned);
+  std::vector<BlockKey> touched;
+  for (const auto& [key, old] : before) {
+    const VoxelBlock* now = map.find(key);
+    bool had_owner = false, surface = false;
+    for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+      const bool cleared = old.owner[v] == 3;
+      had_owner |= cleared;
+      surface |= !cleared && old.weight[v] > 0 && old.tsdf[v] < kFree;
+      if (!now) continue;
+      EXPECT_EQ(now->weight[v], cleared ? 0 : old.weight[v]);
+      EXPECT_EQ(now->owner[v], cleared ? 0u : old.owner[v]);
+      EXPECT_EQ(now->tsdf[v], cleared ? 0 : old.tsdf[v]);
+    }
+    if (had_owner) touched.push_back(key);
+    EXPECT_EQ(now == nullptr, had_owner && !surface);  // only emptied blocks are dropped
+  }
+  EXPECT_EQ(map.take_dirty(), touched);
+  EXPECT_EQ(map.clear_object(ObjectId{3}), 0u);
+  EXPECT_EQ(map.clear_object(ObjectId{77}), 0u);
+}
+
+TEST_F(ClearObject, ReassignedVoxelsBelongToTheOther) {
+  const std::size_t three = count_owned(map, 3), nine = count_owned(map, 9);
+  EXPECT_EQ(map.reassign_object(ObjectId{3}, ObjectId{9}), three);
+  EXPECT_EQ(count_owned(map, 3), 0u);
+  EXPECT_EQ(map.reassign_object(ObjectId{9}, ObjectId{9}), 0u);
+  EXPECT_EQ(map.clear_object(ObjectId{9}), three + nine);
+}
+
+TEST_F(ClearObject, OwnersWrittenByHandAreFound) {
+  VoxelBlock& block = map.touch({50, 50, 50});
+  block.weight[7] = 4;
+  block.owner[7] = 21;
+  block.weight[8] = 4;
+  block.owner[8] = 22;
+  EXPECT_EQ(map.clear_object(ObjectId{21}), 1u);
+  ASSERT_NE(map.find({50, 50, 50}), nullptr);
+  EXPECT_EQ(map.clear_object(ObjectId{22}), 1u);
+  EXPECT_EQ(map.find({50, 50, 50}), nullptr);
+}
+
+TEST_F(ClearObject, SurfaceSeenAsBackgroundLosesItsOwner) {
+  // Within a voxel of the surface, where the mesh gets its owners; a quarter of the truncation.
+  const auto at_surface = [this] {
+    std::size_t count = 0;
+    for (const BlockKey& key : map.sorted_keys()) {
+      const VoxelBlock& block = *map.find(key);
+      for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+        count += block.owner[v] == 3 && std::abs(block.tsdf[v]) < 32767 / 4;
+      }
+    }
+    return count;
+  };
+  const Scene unowned{2.5, {{{-0.4, 1.5, 1.0}, 0.3, 0}, {{0.3, 1.4, 0.9}, 0.25, 9}}};
+  ASSERT_GT(at_surface(), 100u);
+  for (const Pose& pose : arc_of_poses(20, 2)) map.integrate(look(unowned, pose).input(), pool);
+  EXPECT_EQ(at_surface(), 0u);
+}
+
+}  // namespace
+}  // namespace pocd::testing
