@@ -79,10 +79,11 @@ std::map<int, fs::path> numbered_files(const fs::path& folder, const std::string
     if (name.size() <= prefix.size() + suffix.size()) continue;
     const std::string digits =
         name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
-    const bool fits = name.compare(0, prefix.size(), prefix) == 0 &&
-                      name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0 &&
-                      digits.size() <= 9 &&
-                      std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); });
+    const bool fits =
+        name.compare(0, prefix.size(), prefix) == 0 &&
+        name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0 &&
+        digits.size() <= 9 &&
+        std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); });
     if (!fits) continue;
     const auto [place, fresh] = out.emplace(std::stoi(digits), entry.path());
     if (!fresh) {

@@ -1,4 +1,5 @@
-// Images of data sets. All throw InputError naming the file: missing, damaged, or of the wrong kind.
+// Images of data sets. All throw InputError naming the file: missing, damaged, or of the wrong
+// kind.
 #pragma once
 
 #include <filesystem>

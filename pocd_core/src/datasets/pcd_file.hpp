@@ -7,9 +7,9 @@
 namespace pocd {
 
 struct PcdImages {
-  cv::Mat depth_m;  ///< CV_32FC1, the z field; 0 where invalid or label is 0
+  cv::Mat depth_m;     ///< CV_32FC1, the z field; 0 where invalid or label is 0
   cv::Mat raw_labels;  ///< CV_32SC1 as in the file, or empty
-  cv::Mat color;    ///< CV_8UC3 BGR, or empty
+  cv::Mat color;       ///< CV_8UC3 BGR, or empty
 };
 
 /// Throws InputError naming the file: unreadable, shorter than its header says, not organised, or

@@ -23,8 +23,8 @@ cv::Mat class_labels(const cv::Mat& raw, int divisor, const std::string& source)
       const int class_id = in[u] == 0 ? 0 : in[u] < 10 ? kTableClass : kObjectClass;
       const int instance = divisor > 1 && class_id == kObjectClass ? in[u] / 10 : 0;
       if (in[u] < 0 || (divisor > 1 && instance >= divisor)) {
-        throw InputError(source + ": label " + std::to_string(in[u]) + " does not fit label_divisor " +
-                         std::to_string(divisor));
+        throw InputError(source + ": label " + std::to_string(in[u]) +
+                         " does not fit label_divisor " + std::to_string(divisor));
       }
       label[u] = static_cast<std::uint16_t>(class_id * divisor + instance);
     }
@@ -42,7 +42,8 @@ class PcdReader : public DatasetReader {
     if (label_divisor_ < 1 || label_divisor_ > 10000) {
       throw InputError("pcd: label_divisor must be in [1, 10000]");
     }
-    if (!options.camera) throw InputError("pcd: no camera given, neither by camera.yaml nor by option");
+    if (!options.camera)
+      throw InputError("pcd: no camera given, neither by camera.yaml nor by option");
     if (!options.T_W_C) {
       throw InputError("pcd: no camera pose given, neither by camera.yaml nor by option");
     }

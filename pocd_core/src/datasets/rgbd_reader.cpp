@@ -57,8 +57,8 @@ class RgbdReader : public DatasetReader {
         gravity_W = read_matrix(gravity_file, 1, 3).transpose();
         source = gravity_file.string();
       }
-      folders_.push_back({path, read_intrinsics(path / "camera-intrinsics.txt"),
-                          levelling(gravity_W, source)});
+      folders_.push_back(
+          {path, read_intrinsics(path / "camera-intrinsics.txt"), levelling(gravity_W, source)});
       list(folders_.size() - 1);
     }
   }

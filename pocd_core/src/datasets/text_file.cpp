@@ -72,7 +72,8 @@ Eigen::MatrixXd read_matrix(const std::filesystem::path& file, int rows, int col
   }
   Eigen::MatrixXd out(rows, columns);
   for (int r = 0; r < rows; ++r) {
-    const std::vector<double> row = parse_numbers(lines[r], static_cast<std::size_t>(columns), file);
+    const std::vector<double> row =
+        parse_numbers(lines[r], static_cast<std::size_t>(columns), file);
     for (int c = 0; c < columns; ++c) out(r, c) = row[c];
   }
   return out;

@@ -32,8 +32,8 @@ void parse_pose(const NumberedLine& line, const fs::path& file, Entry& entry) {
   }
   const Eigen::Quaterniond q(v[9], v[6], v[7], v[8]);
   if (std::abs(q.norm() - 1.0) > 1e-2) {
-    throw InputError(place(file, line.number) + ": quaternion has length " + std::to_string(q.norm()) +
-                     ", must be 1");
+    throw InputError(place(file, line.number) + ": quaternion has length " +
+                     std::to_string(q.norm()) + ", must be 1");
   }
   entry.stamp_ns = static_cast<StampNs>(v[1]) * 1'000'000'000 + static_cast<StampNs>(v[2]);
   entry.T_W_B.translation() = Eigen::Vector3d(v[3], v[4], v[5]);
@@ -162,8 +162,8 @@ class TorwicReader : public DatasetReader {
     const cv::Mat depth = read_depth_image(entry.depth);
     const cv::Mat labels = entry.labels.empty() ? cv::Mat() : read_label_image(entry.labels);
     const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
-    Frame frame = make_frame(entry.stamp_ns, camera_, entry.T_W_B * extrinsics_.T_B_C, depth, labels,
-                             color, entry.depth.string());
+    Frame frame = make_frame(entry.stamp_ns, camera_, entry.T_W_B * extrinsics_.T_B_C, depth,
+                             labels, color, entry.depth.string());
     frame.sequence = index;
     return frame;
   }

@@ -59,8 +59,8 @@ void TorwicWriter::write(const Frame& frame) {
   const Eigen::Vector3d p = T_W_B.translation();
   const Eigen::Quaterniond q(T_W_B.linear());
   poses_ << next_ << ' ' << frame.stamp_ns / 1'000'000'000 << ' ' << frame.stamp_ns % 1'000'000'000
-         << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z()
-         << ' ' << q.w() << '\n'
+         << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << q.x() << ' ' << q.y() << ' '
+         << q.z() << ' ' << q.w() << '\n'
          << std::flush;
   if (!poses_) throw InputError((folder_ / "poses.txt").string() + ": cannot be written");
   ++next_;

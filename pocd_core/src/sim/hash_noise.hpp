@@ -37,8 +37,8 @@ inline double smooth_noise(std::uint64_t seed, std::uint64_t channel, double x) 
   const double cell = std::floor(x);
   const double t = x - cell;
   const auto knot = [&](double at) {
-    return 2.0 * unit_of(hash_of(seed, channel, static_cast<std::uint64_t>(
-                                                    static_cast<std::int64_t>(at)))) -
+    return 2.0 * unit_of(hash_of(seed, channel,
+                                 static_cast<std::uint64_t>(static_cast<std::int64_t>(at)))) -
            1.0;
   };
   const double blend = t * t * (3.0 - 2.0 * t);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr float kNear_m = 0.02f;
 
-/// A part prepared for one view: ray origin in the part's frame P, ray direction as a linear function
-/// of the pixel, and the screen rectangle outside of which no ray can meet it.
+/// A part prepared for one view: ray origin in the part's frame P, ray direction as a linear
+/// function of the pixel, and the screen rectangle outside of which no ray can meet it.
 struct ViewPart {
   Shape shape;
   int object, part;
@@ -96,8 +96,8 @@ POCD_KERNEL void cast_cylinder_row(const ViewPart& part, int v, float* depth_m,
     const float az = (-hz - oz) * iz, cz = (hz - oz) * iz;
     const float enter = std::max((-b - root) * ia, std::min(az, cz));
     const float leave = std::min((-b + root) * ia, std::max(az, cz));
-    const bool hit = (discriminant > 0.0f) & (enter <= leave) & (enter >= kNear_m) &
-                     (enter < depth_m[u]);
+    const bool hit =
+        (discriminant > 0.0f) & (enter <= leave) & (enter >= kNear_m) & (enter < depth_m[u]);
     depth_m[u] = hit ? enter : depth_m[u];
     part_id[u] = hit ? part.part : part_id[u];
   }

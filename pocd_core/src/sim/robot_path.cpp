@@ -8,7 +8,9 @@
 namespace pocd {
 namespace {
 
-double heading(const Eigen::Vector2d& direction) { return std::atan2(direction.y(), direction.x()); }
+double heading(const Eigen::Vector2d& direction) {
+  return std::atan2(direction.y(), direction.x());
+}
 
 /// Turn from one direction to the next, in (-pi, pi].
 double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -63,8 +65,7 @@ RobotPath::RobotPath(const PathSpec& spec, const std::string& source) {
       // A lap that starts on a corner's arc starts at the arc's nearer end.
       double begin_s = 0.0;
       for (const Piece& piece : pieces_) begin_s += piece.duration_s;
-      start_s_ = begin_s +
-                 std::clamp(start_left_m - before, 0.0, (b - a).norm()) / spec.speed_m_s;
+      start_s_ = begin_s + std::clamp(start_left_m - before, 0.0, (b - a).norm()) / spec.speed_m_s;
       start_found = true;
     }
     start_left_m -= length(edge);
@@ -79,8 +80,8 @@ RobotPath::RobotPath(const PathSpec& spec, const std::string& source) {
     arc.yaw0_rad = heading(direction(edge));
     arc.yaw1_rad = arc.yaw0_rad + angle;
     arc.signed_radius_m = std::copysign(spec.corner_radius_m, angle);
-    arc.duration_s = std::abs(angle) * std::max(1.0 / spec.turn_rate_rad_s,
-                                                spec.corner_radius_m / spec.speed_m_s);
+    arc.duration_s = std::abs(angle) *
+                     std::max(1.0 / spec.turn_rate_rad_s, spec.corner_radius_m / spec.speed_m_s);
     pieces_.push_back(arc);
   }
   require(!spec.closed || (start_found && spec.start_m >= 0.0), "start_m is not on the path");

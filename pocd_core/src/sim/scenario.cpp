@@ -25,7 +25,8 @@ SceneObject slab(const std::string& name, ClassId class_id, const Eigen::Vector3
   return object;
 }
 
-void validate_object(const SceneObject& object, const Scenario& scenario, const std::string& where) {
+void validate_object(const SceneObject& object, const Scenario& scenario,
+                     const std::string& where) {
   const std::string what = where + ": object '" + object.name + "' ";
   if (object.parts.empty()) throw InputError(what + "has no parts");
   for (const ScenePart& part : object.parts) {
@@ -33,7 +34,8 @@ void validate_object(const SceneObject& object, const Scenario& scenario, const 
       throw InputError(what + "has a size that is not > 0");
     }
   }
-  if (object.transient && object.track.empty()) throw InputError(what + "is transient without track");
+  if (object.transient && object.track.empty())
+    throw InputError(what + "is transient without track");
   for (std::size_t i = 1; i < object.track.size(); ++i) {
     if (object.track[i].time_s < object.track[i - 1].time_s) {
       throw InputError(what + "has a track that goes back in time");

@@ -48,7 +48,8 @@ SceneObject to_object(const YAML::Node& node, const std::string& where, const YA
   YAML::Node kind;
   if (probe.has("kind")) {
     const std::string word = probe.text("kind");
-    if (!kinds.IsMap() || !kinds[word].IsDefined()) probe.fail("kind", "is unknown: '" + word + "'");
+    if (!kinds.IsMap() || !kinds[word].IsDefined())
+      probe.fail("kind", "is unknown: '" + word + "'");
     kind.reset(kinds[word]);
   }
   YamlFields fields(node, place, kind);
@@ -237,7 +238,8 @@ struct SensorFields {
     if (value < range.low || value > range.high) out_of(key, range);
   }
   void out_of(const char* key, Range range) {
-    fields.fail(key, "must be in [" + std::to_string(range.low) + ", " + std::to_string(range.high) + "]");
+    fields.fail(
+        key, "must be in [" + std::to_string(range.low) + ", " + std::to_string(range.high) + "]");
   }
 };
 
@@ -324,7 +326,8 @@ Loaded load(const std::filesystem::path& file, int depth) {
   if (top.has("objects")) {
     const YAML::Node list = top.node("objects");
     for (std::size_t i = 0; i < list.size(); ++i) {
-      objects.push_back(to_object(list[i], where + ": objects[" + std::to_string(i) + "]", out.kinds));
+      objects.push_back(
+          to_object(list[i], where + ": objects[" + std::to_string(i) + "]", out.kinds));
     }
   }
   if (top.has("visits")) {

@@ -28,9 +28,9 @@ OrientedBox bounding_box(const SceneObject& object) {
     if (part.shape == Shape::kCylinder) {
       // The disc of radius r with unit normal n reaches r sqrt(1 - n_i^2) along axis i.
       const Eigen::Vector3d axis = T_H_P.linear().col(2);
-      extent = (half.x() * (1.0 - axis.array().square()).max(0.0).sqrt() +
-                half.z() * axis.array().abs())
-                   .matrix();
+      extent =
+          (half.x() * (1.0 - axis.array().square()).max(0.0).sqrt() + half.z() * axis.array().abs())
+              .matrix();
     }
     low = low.min((T_H_P.translation() - extent).array());
     high = high.max((T_H_P.translation() + extent).array());
@@ -66,8 +66,8 @@ bool exists_at(const SceneObject& object, double time_s) {
 }
 
 bool boxes_overlap(const OrientedBox& a, const OrientedBox& b, double tolerance_m) {
-  const double gap_z = std::abs(a.pose.position_W.z() - b.pose.position_W.z()) -
-                       0.5 * (a.size_m.z() + b.size_m.z());
+  const double gap_z =
+      std::abs(a.pose.position_W.z() - b.pose.position_W.z()) - 0.5 * (a.size_m.z() + b.size_m.z());
   if (gap_z > -tolerance_m) return false;
   const auto axes = [](const OrientedBox& box) {
     const double c = std::cos(box.pose.yaw_rad), s = std::sin(box.pose.yaw_rad);

@@ -14,8 +14,8 @@ enum Channel : std::uint64_t { kGrid = 11, kPixel = 12, kHole = 13, kBlob = 14, 
 constexpr int kPatternFrames = 8;
 
 /// Noise of unit variance that is smooth over a grid of cells and over frames. Interpolation of
-/// independent knots with weights w has variance sum w^2; dividing by its root keeps the variance the
-/// same everywhere.
+/// independent knots with weights w has variance sum w^2; dividing by its root keeps the variance
+/// the same everywhere.
 class SmoothField {
  public:
   SmoothField(const NoiseKey& key, int width, int height, double cell_px)
@@ -45,8 +45,8 @@ class SmoothField {
       const double x = u / cell_px_;
       const int c = static_cast<int>(x);
       const float a = static_cast<float>(x - c);
-      const float value = (1 - b) * ((1 - a) * low[c] + a * low[c + 1]) +
-                          b * ((1 - a) * high[c] + a * high[c + 1]);
+      const float value =
+          (1 - b) * ((1 - a) * low[c] + a * low[c + 1]) + b * ((1 - a) * high[c] + a * high[c + 1]);
       out[u] = value / std::sqrt(row_variance * ((1 - a) * (1 - a) + a * a));
     }
   }
@@ -57,7 +57,8 @@ class SmoothField {
   std::vector<float> knots_;
 };
 
-/// Stereo sees no match just beside a nearer surface: marks far-side pixels within `reach` of an edge.
+/// Stereo sees no match just beside a nearer surface: marks far-side pixels within `reach` of an
+/// edge.
 cv::Mat far_side_of_edges(const cv::Mat& depth_m, int reach) {
   cv::Mat marked = cv::Mat::zeros(depth_m.size(), CV_8UC1);
   const auto far_of = [](float z, float neighbour) {
@@ -104,7 +105,8 @@ void punch_holes(const SensorModel& model, const NoiseKey& key, cv::Mat& depth_m
     depth_m.ptr<float>()[random.below(static_cast<std::uint64_t>(depth_m.total()))] = 0.0f;
   }
   Random blob(hash_of(key.seed, kBlob, key.robot, key.frame));
-  const int blobs = model.hole_blobs_per_frame > 0.0 ? draw_count(model.hole_blobs_per_frame, blob) : 0;
+  const int blobs =
+      model.hole_blobs_per_frame > 0.0 ? draw_count(model.hole_blobs_per_frame, blob) : 0;
   for (int i = 0; i < blobs; ++i) {
     const int cu = static_cast<int>(blob.below(static_cast<std::uint64_t>(depth_m.cols)));
     const int cv = static_cast<int>(blob.below(static_cast<std::uint64_t>(depth_m.rows)));

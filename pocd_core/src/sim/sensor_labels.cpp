@@ -12,7 +12,8 @@ namespace {
 
 enum Channel : std::uint64_t { kBorder = 21, kBlob = 22, kAlias = 23, kPose = 24, kColor = 25 };
 
-/// Looks every pixel up at a place displaced by a smooth field: borders become ragged, insides stay.
+/// Looks every pixel up at a place displaced by a smooth field: borders become ragged, insides
+/// stay.
 void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labels) {
   constexpr int kCell_px = 5;  // a few pixels, so that borders look torn and not merely shifted
   const int columns = labels.cols / kCell_px + 2, rows = labels.rows / kCell_px + 2;
@@ -22,8 +23,10 @@ void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labe
     const std::uint64_t hash = hash_of(seed, i);
     const double amplitude = model.label_border_px;
     knots[i] = cv::Vec2f(
-        static_cast<float>(amplitude * (2.0 * static_cast<double>(hash & 0xFFFFFFFF) / 4294967296.0 - 1.0)),
-        static_cast<float>(amplitude * (2.0 * static_cast<double>(hash >> 32) / 4294967296.0 - 1.0)));
+        static_cast<float>(amplitude *
+                           (2.0 * static_cast<double>(hash & 0xFFFFFFFF) / 4294967296.0 - 1.0)),
+        static_cast<float>(amplitude *
+                           (2.0 * static_cast<double>(hash >> 32) / 4294967296.0 - 1.0)));
   }
   const cv::Mat clean = labels.clone();
   for (int v = 0; v < labels.rows; ++v) {
@@ -36,22 +39,27 @@ void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labe
       const float a = static_cast<float>(u % kCell_px) / kCell_px;
       const cv::Vec2f shift =
           (1 - b) * ((1 - a) * low[0] + a * low[1]) + b * ((1 - a) * high[0] + a * high[1]);
-      const int from_u = std::clamp(u + static_cast<int>(std::lround(shift[0])), 0, labels.cols - 1);
-      const int from_v = std::clamp(v + static_cast<int>(std::lround(shift[1])), 0, labels.rows - 1);
+      const int from_u =
+          std::clamp(u + static_cast<int>(std::lround(shift[0])), 0, labels.cols - 1);
+      const int from_v =
+          std::clamp(v + static_cast<int>(std::lround(shift[1])), 0, labels.rows - 1);
       out[u] = clean.at<std::uint16_t>(from_v, from_u);
     }
   }
 }
 
-void wrong_blobs(const SensorModel& model, const NoiseKey& key, int label_divisor, cv::Mat& labels) {
-  // Classes a network confuses things with in a warehouse: static feature, rack, goods, machinery, cart.
+void wrong_blobs(const SensorModel& model, const NoiseKey& key, int label_divisor,
+                 cv::Mat& labels) {
+  // Classes a network confuses things with in a warehouse: static feature, rack, goods, machinery,
+  // cart.
   constexpr int kWrong[] = {0, 4, 5, 6, 7, 8, 9, 12};
   Random random(hash_of(key.seed, kBlob, key.robot, key.frame));
   const int count = static_cast<int>(std::floor(model.label_blobs_per_frame + random.uniform()));
   for (int i = 0; i < count; ++i) {
     const int cu = static_cast<int>(random.below(static_cast<std::uint64_t>(labels.cols)));
     const int cv = static_cast<int>(random.below(static_cast<std::uint64_t>(labels.rows)));
-    const int radius = static_cast<int>(std::lround(model.label_blob_radius_px * random.uniform(0.3, 1.0)));
+    const int radius =
+        static_cast<int>(std::lround(model.label_blob_radius_px * random.uniform(0.3, 1.0)));
     const int wrong = kWrong[random.below(8)] * label_divisor;
     for (int v = std::max(0, cv - radius); v <= std::min(labels.rows - 1, cv + radius); ++v) {
       for (int u = std::max(0, cu - radius); u <= std::min(labels.cols - 1, cu + radius); ++u) {
@@ -75,7 +83,8 @@ void degrade_labels(const SensorModel& model, const NoiseKey& key, int label_div
       std::uint16_t* row = labels.ptr<std::uint16_t>(v);
       for (int u = 0; u < labels.cols; ++u) {
         if (row[u] / label_divisor != model.alias_class_a) continue;
-        row[u] = static_cast<std::uint16_t>(model.alias_class_b * label_divisor + row[u] % label_divisor);
+        row[u] = static_cast<std::uint16_t>(model.alias_class_b * label_divisor +
+                                            row[u] % label_divisor);
       }
     }
   }

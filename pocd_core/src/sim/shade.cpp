@@ -21,8 +21,10 @@ float speckle(const Eigen::Vector3f& p, float cell, float strength) {
   const auto index = [&](float x) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / cell)));
   };
-  const double unit = unit_of(hash_of(7, index(p.x()), index(p.y()), index(p.z())));
-  return 1.0f + strength * (static_cast<float>(unit) - 0.5f);
+  // One mixing step for the whole cell: this runs once per pixel.
+  const std::uint64_t key =
+      index(p.x()) * 73856093u ^ index(p.y()) * 19349663u ^ index(p.z()) * 83492791u;
+  return 1.0f + strength * (static_cast<float>(unit_of(Random(key).next())) - 0.5f);
 }
 
 /// Factor on the base colour at point p of the part (part frame, metres).
@@ -44,7 +46,8 @@ float texture_factor(Texture texture, const Eigen::Vector3f& p_P, const Eigen::V
       return 0.9f + 0.1f * std::sin(along * 12.0f + 0.7f * std::sin(p_P.z() * 2.0f));
     }
     case Texture::kConcrete: {
-      const float joint = away_from_line(p_P.x(), 2.0f, 0.01f) * away_from_line(p_P.y(), 2.0f, 0.01f);
+      const float joint =
+          away_from_line(p_P.x(), 2.0f, 0.01f) * away_from_line(p_P.y(), 2.0f, 0.01f);
       return (0.8f + 0.2f * joint) * speckle(p_P, 0.07f, 0.08f);
     }
     case Texture::kWood:
@@ -69,8 +72,7 @@ Eigen::Vector3f normal_of_hit(const ScenePart& part, const Eigen::Vector3f& p_P,
 
 }  // namespace
 
-Shader::Shader(const Scene& scene, const CameraModel& camera, const Pose& T_W_C)
-    : camera_(camera) {
+Shader::Shader(const Scene& scene, const CameraModel& camera, const Pose& T_W_C) : camera_(camera) {
   for (const SceneObject& object : scene.objects) {
     for (const ScenePart& part : object.parts) {
       const Pose T_W_P = object.T_W_O * part.T_O_P;

@@ -1,4 +1,5 @@
-// Paints hits of a rendered view: Lambert light from a fixed direction and simple procedural textures.
+// Paints hits of a rendered view: Lambert light from a fixed direction and simple procedural
+// textures.
 #pragma once
 
 #include <cstdint>

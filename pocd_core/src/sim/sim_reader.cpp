@@ -60,11 +60,13 @@ SimSchedule::SimSchedule(const Scenario& scenario)
       for (std::size_t k = 0;; ++k) {
         const double time_s = static_cast<double>(k) * period_s + shift_s;
         if (time_s > paths_[r].duration_s()) break;
-        frames_.push_back({kStart_ns + to_ns(visit_start_s + time_s), visit, r, k, sequence[r]++, time_s});
+        frames_.push_back(
+            {kStart_ns + to_ns(visit_start_s + time_s), visit, r, k, sequence[r]++, time_s});
       }
     }
-    std::stable_sort(frames_.begin() + static_cast<std::ptrdiff_t>(first), frames_.end(),
-                     [](const SimFrameTime& a, const SimFrameTime& b) { return a.stamp_ns < b.stamp_ns; });
+    std::stable_sort(
+        frames_.begin() + static_cast<std::ptrdiff_t>(first), frames_.end(),
+        [](const SimFrameTime& a, const SimFrameTime& b) { return a.stamp_ns < b.stamp_ns; });
     visit_start_s += longest_s + period_s + scenario.visit_gap_s;
   }
 }
@@ -115,8 +117,8 @@ Frame SimReader::frame(std::size_t index) const {
   degrade_depth(scenario_.sensor, key, frame.depth_m);
   degrade_labels(scenario_.sensor, key, options_.label_divisor, frame.labels);
   if (!frame.color.empty()) degrade_color(scenario_.sensor, key, frame.color);
-  frame.T_W_C = degrade_pose(scenario_.sensor, key, 1e-9 * static_cast<double>(when.stamp_ns),
-                             frame.T_W_C);
+  frame.T_W_C =
+      degrade_pose(scenario_.sensor, key, 1e-9 * static_cast<double>(when.stamp_ns), frame.T_W_C);
   return frame;
 }
 

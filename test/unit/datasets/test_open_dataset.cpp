@@ -44,7 +44,8 @@ TEST(OpenDataset, EmptyFolderIsNamed) {
 }
 
 TEST(OpenDataset, SimulatorTakesScenariosInOrder) {
-  const std::filesystem::path scenarios = std::filesystem::path(POCD_SOURCE_DIR) / "config/sim/torwic";
+  const std::filesystem::path scenarios =
+      std::filesystem::path(POCD_SOURCE_DIR) / "config/sim/torwic";
   DatasetOptions options;
   options.format = "sim";
   options.inputs = {scenarios / "0.yaml"};

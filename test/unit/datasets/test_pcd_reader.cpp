@@ -19,11 +19,13 @@ std::string ascii_pcd(const std::vector<int>& labels, bool organised = true) {
   const int points = kWidth * kHeight;
   out << "# .PCD v0.7\nVERSION 0.7\nFIELDS label x y z rgba\nSIZE 4 4 4 4 4\nTYPE U F F F U\n"
       << "COUNT 1 1 1 1 1\nWIDTH " << (organised ? kWidth : points) << "\nHEIGHT "
-      << (organised ? kHeight : 1) << "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << points << "\nDATA ascii\n";
+      << (organised ? kHeight : 1) << "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << points
+      << "\nDATA ascii\n";
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const std::string z = u == 0 && v == 0 ? "nan" : std::to_string(1.0 + 0.1 * v);
-      out << labels[u] << " 0 0 " << z << " " << (0xFF000000u | (10u << 16) | (20u << 8) | 30u) << "\n";
+      out << labels[u] << " 0 0 " << z << " " << (0xFF000000u | (10u << 16) | (20u << 8) | 30u)
+          << "\n";
     }
   }
   return out.str();
@@ -69,7 +71,8 @@ TEST(PcdReader, KeepsInstances) {
   options.label_divisor = 100;
   const Frame frame = *open_dataset(options)->next();
   const int expected[kWidth] = {100, 0, 100, 201, 202, 203, 100, 100};
-  for (int u = 0; u < kWidth; ++u) EXPECT_EQ(frame.labels.at<std::uint16_t>(3, u), expected[u]) << u;
+  for (int u = 0; u < kWidth; ++u)
+    EXPECT_EQ(frame.labels.at<std::uint16_t>(3, u), expected[u]) << u;
 }
 
 TEST(PcdReader, CameraFileBesideTheFiles) {
@@ -85,8 +88,9 @@ TEST(PcdReader, CameraFileBesideTheFiles) {
   EXPECT_EQ(frame.camera, (CameraModel{8, 6, 12, 13, 3, 2}));
   EXPECT_EQ(frame.T_W_C.translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_NEAR(frame.T_W_C.linear()(2, 2), -1.0, 1e-12);
-  for (const char* text : {"camara: {}\n", "camera: {width: 8}\n", "T_W_C: {translation: [1, 2, 3]}\n",
-                           "camera: {width: 8, height: 6, fx: 0, fy: 13, cx: 3, cy: 2}\n", "[\n"}) {
+  for (const char* text :
+       {"camara: {}\n", "camera: {width: 8}\n", "T_W_C: {translation: [1, 2, 3]}\n",
+        "camera: {width: 8, height: 6, fx: 0, fy: 13, cx: 3, cy: 2}\n", "[\n"}) {
     folder.write("camera.yaml", text);
     EXPECT_NE(open_error(options).find("camera.yaml"), std::string::npos) << text;
   }
@@ -97,7 +101,8 @@ TEST(PcdReader, CameraFileBesideTheFiles) {
 TEST(PcdReader, BadFilesAreSkippedWithAllTheirRepeats) {
   const std::string good = ascii_pcd(kLabels);
   std::string other_size = good;
-  other_size.replace(other_size.find("WIDTH 8"), 7, "WIDTH 6").replace(other_size.find("HEIGHT 6"), 8, "HEIGHT 8");
+  other_size.replace(other_size.find("WIDTH 8"), 7, "WIDTH 6")
+      .replace(other_size.find("HEIGHT 6"), 8, "HEIGHT 8");
   std::string no_z = good;
   no_z.replace(no_z.find("x y z"), 5, "x y k");
   // A compressed file that ends before the size in its header.
@@ -106,9 +111,11 @@ TEST(PcdReader, BadFilesAreSkippedWithAllTheirRepeats) {
   cut += "DATA binary_compressed\n" + std::string(reinterpret_cast<const char*>(sizes), 8) + "abc";
   std::string garbage = good.substr(0, good.find("DATA"));
   const std::uint32_t few[2] = {12, 960};
-  garbage += "DATA binary_compressed\n" + std::string(reinterpret_cast<const char*>(few), 8) + "garbage data";
+  garbage += "DATA binary_compressed\n" + std::string(reinterpret_cast<const char*>(few), 8) +
+             "garbage data";
   std::string binary = good.substr(0, good.find("DATA")) + "DATA binary\nshort";
-  const std::string cases[] = {"hello", "", ascii_pcd(kLabels, false), other_size, no_z, cut, garbage, binary};
+  const std::string cases[] = {"hello", "",    ascii_pcd(kLabels, false), other_size, no_z, cut,
+                               garbage, binary};
   for (std::size_t i = 0; i < std::size(cases); ++i) {
     const ScratchFolder folder;
     folder.write("a.pcd", good);

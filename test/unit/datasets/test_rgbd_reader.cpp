@@ -19,7 +19,8 @@ void make_sequence(const ScratchFolder& folder, int count) {
   folder.write("camera-intrinsics.txt", "30 0 15.5\n0 31 11.5\n0 0 1\n");
   for (int i = 0; i < count; ++i) {
     write_image(folder / (stem(i) + ".depth.png"), ramp_depth());
-    write_image(folder / (stem(i) + ".color.jpg"), cv::Mat(24, 32, CV_8UC3, cv::Scalar(10, 20, 30)));
+    write_image(folder / (stem(i) + ".color.jpg"),
+                cv::Mat(24, 32, CV_8UC3, cv::Scalar(10, 20, 30)));
     folder.write(stem(i) + ".pose.txt", kPose);
   }
 }
@@ -79,13 +80,14 @@ TEST(RgbdReader, LevelsTheWorld) {
 }
 
 TEST(RgbdReader, BadIntrinsicsAreNamed) {
-  for (const char* text : {"0 0 15.5\n0 31 11.5\n0 0 1\n", "30 0 15.5\n0 nan 11.5\n0 0 1\n",
-                           "30 0 15.5\n0 31 11.5\n", "30 15.5\n31 11.5\n0 1\n", "a b c\nd e f\n0 0 1\n",
-                           "30 0 15.5\n0 31 11.5\n0 0 2\n"}) {
+  for (const char* text :
+       {"0 0 15.5\n0 31 11.5\n0 0 1\n", "30 0 15.5\n0 nan 11.5\n0 0 1\n", "30 0 15.5\n0 31 11.5\n",
+        "30 15.5\n31 11.5\n0 1\n", "a b c\nd e f\n0 0 1\n", "30 0 15.5\n0 31 11.5\n0 0 2\n"}) {
     const ScratchFolder folder;
     make_sequence(folder, 1);
     folder.write("camera-intrinsics.txt", text);
-    EXPECT_NE(open_error(options_for(folder)).find("camera-intrinsics.txt"), std::string::npos) << text;
+    EXPECT_NE(open_error(options_for(folder)).find("camera-intrinsics.txt"), std::string::npos)
+        << text;
   }
 }
 
@@ -123,7 +125,8 @@ const Defect kDefects[] = {
      "no image"},
     {"damaged_depth",
      [](const ScratchFolder& f) {
-       std::fstream file(f / (stem(1) + ".depth.png"), std::ios::in | std::ios::out | std::ios::binary);
+       std::fstream file(f / (stem(1) + ".depth.png"),
+                         std::ios::in | std::ios::out | std::ios::binary);
        file.seekp(60);
        file << "damage damage damage";
      },
@@ -137,9 +140,11 @@ const Defect kDefects[] = {
      [](const ScratchFolder& f) { write_image(f / (stem(1) + ".depth.png"), ramp_depth(16, 24)); },
      "16x24"},
     {"missing_depth",
-     [](const ScratchFolder& f) { std::filesystem::remove(f / (stem(1) + ".depth.png")); }, "no depth"},
+     [](const ScratchFolder& f) { std::filesystem::remove(f / (stem(1) + ".depth.png")); },
+     "no depth"},
     {"missing_pose",
-     [](const ScratchFolder& f) { std::filesystem::remove(f / (stem(1) + ".pose.txt")); }, "no pose"},
+     [](const ScratchFolder& f) { std::filesystem::remove(f / (stem(1) + ".pose.txt")); },
+     "no pose"},
     {"pose_nan",
      [](const ScratchFolder& f) {
        f.write(stem(1) + ".pose.txt", "1 0 0 0\n0 1 0 nan\n0 0 1 0\n0 0 0 1\n");

@@ -30,9 +30,9 @@ TEST(TextFile, ErrorsNameFileAndLine) {
     return "";
   };
   const std::pair<std::string, std::string> cases[] = {
-      {"1 2\n3\n", "m.txt:2: has 1 values"}, {"1 2\n3 4 5\n", "m.txt:2: has 3 values"},
-      {"1 x\n3 4\n", "m.txt:1: 'x'"},        {"1 2\n\n3 nan\n", "m.txt:3: 'nan'"},
-      {"1 2\n3 inf\n", "m.txt:2: 'inf'"},    {"1 2\n3 4e999\n", "m.txt:2: '4e999'"},
+      {"1 2\n3\n", "m.txt:2: has 1 values"},  {"1 2\n3 4 5\n", "m.txt:2: has 3 values"},
+      {"1 x\n3 4\n", "m.txt:1: 'x'"},         {"1 2\n\n3 nan\n", "m.txt:3: 'nan'"},
+      {"1 2\n3 inf\n", "m.txt:2: 'inf'"},     {"1 2\n3 4e999\n", "m.txt:2: '4e999'"},
       {"1 2.5.1\n3 4\n", "m.txt:1: '2.5.1'"}, {"1 2\n", "m.txt: has 1 lines"}};
   for (const auto& [text, expected] : cases) {
     EXPECT_NE(error_of(text).find(expected), std::string::npos) << text << " -> " << error_of(text);

@@ -14,7 +14,8 @@ namespace {
 const CameraModel kSmall{32, 24, 30, 31, 15.5, 11.5};
 
 std::string pose_line(int index) {
-  return std::to_string(index) + " 100 " + std::to_string(index * 66'000'000) + " 1 2 0.1 0 0 0 1\n";
+  return std::to_string(index) + " 100 " + std::to_string(index * 66'000'000) +
+         " 1 2 0.1 0 0 0 1\n";
 }
 
 /// Three good frames with images 0.png, 1.png, 2.png.
@@ -57,7 +58,8 @@ TEST(TorwicReader, ReadsFramesInNumericOrder) {
   EXPECT_TRUE(frames[0].labels.empty());  // no Segmentation and no RGB folder
   EXPECT_TRUE(frames[0].color.empty());
   // Poses are of base_link; the camera sits 0.52 m ahead of it and 0.011 m above (method.md).
-  EXPECT_NEAR((frames[0].T_W_C.translation() - Eigen::Vector3d(1.520, 2.032, 0.111)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((frames[0].T_W_C.translation() - Eigen::Vector3d(1.520, 2.032, 0.111)).norm(), 0.0,
+              1e-12);
   EXPECT_EQ(reader->extrinsics().camera_frame, "realsense_front_camera_color_optical_frame");
   // It looks forward and 15 degrees up.
   EXPECT_NEAR(frames[0].T_W_C.linear()(0, 2), 0.966, 1e-3);
@@ -142,22 +144,27 @@ const Defect kDefects[] = {
      "poses.txt:2: 'nan'"},
     {"pose_short", [](const ScratchFolder& f) { second_pose(f, "1 100 66000000 1 2 0 0 0 0"); },
      "poses.txt:2: has 9"},
-    {"pose_no_number", [](const ScratchFolder& f) { second_pose(f, "1 100 66000000 1 2 zero 0 0 0 1"); },
+    {"pose_no_number",
+     [](const ScratchFolder& f) { second_pose(f, "1 100 66000000 1 2 zero 0 0 0 1"); },
      "poses.txt:2: 'zero'"},
-    {"pose_quaternion", [](const ScratchFolder& f) { second_pose(f, "1 100 66000000 1 2 0 0 0 0 0.5"); },
+    {"pose_quaternion",
+     [](const ScratchFolder& f) { second_pose(f, "1 100 66000000 1 2 0 0 0 0 0.5"); },
      "poses.txt:2: quaternion"},
     {"pose_stamp", [](const ScratchFolder& f) { second_pose(f, "1 100 -5 1 2 0 0 0 0 1"); },
      "poses.txt:2: stamp"},
     {"pose_stamp_goes_back", [](const ScratchFolder& f) { second_pose(f, "1 99 0 1 2 0 0 0 0 1"); },
      "not after"},
-    {"pose_missing", [](const ScratchFolder& f) { f.write("poses.txt", pose_line(0) + pose_line(2)); },
+    {"pose_missing",
+     [](const ScratchFolder& f) { f.write("poses.txt", pose_line(0) + pose_line(2)); },
      "no line with this index"},
-    {"depth_missing", [](const ScratchFolder& f) { std::filesystem::remove(f.path() / "Depth/1.png"); },
+    {"depth_missing",
+     [](const ScratchFolder& f) { std::filesystem::remove(f.path() / "Depth/1.png"); },
      "Depth: no image 1"},
     {"labels_missing",
      [](const ScratchFolder& f) { std::filesystem::remove(f.path() / "Segmentation/1.png"); },
      "Segmentation: no image 1"},
-    {"depth_truncated", [](const ScratchFolder& f) { truncate(f.path() / "Depth/1.png"); }, "truncated"},
+    {"depth_truncated", [](const ScratchFolder& f) { truncate(f.path() / "Depth/1.png"); },
+     "truncated"},
     {"depth_is_rgb",
      [](const ScratchFolder& f) {
        write_image(f.path() / "Depth/1.png", cv::Mat(24, 32, CV_8UC3, cv::Scalar(1, 2, 3)));
@@ -180,8 +187,8 @@ INSTANTIATE_TEST_SUITE_P(Each, TorwicDefect, testing::ValuesIn(kDefects),
 TEST(TorwicReader, LinesThatBelongToNoFrameAreCounted) {
   const ScratchFolder folder;
   make_sequence(folder);
-  folder.write("poses.txt", "# id sec nsec ...\n" + pose_line(0) + "x 1\n" + pose_line(1) + pose_line(1) +
-                                pose_line(2));
+  folder.write("poses.txt", "# id sec nsec ...\n" + pose_line(0) + "x 1\n" + pose_line(1) +
+                                pose_line(1) + pose_line(2));
   const auto reader = open_dataset(options_for(folder));
   EXPECT_EQ(read_all(*reader).size(), 3u);
   ASSERT_EQ(reader->problems().size(), 2u);

@@ -88,12 +88,14 @@ Scene random_scene(Random& random) {
   for (int i = 0; i < 12; ++i) {
     SceneObject object;
     object.class_id = static_cast<ClassId>(i + 1);
-    object.T_W_O.translation() = 3.0 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    object.T_W_O.translation() =
+        3.0 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     object.T_W_O.linear() = random_rotation(random).toRotationMatrix();
     for (int k = 0; k <= i % 2; ++k) {
       ScenePart part;
       part.shape = random.uniform() < 0.5 ? Shape::kBox : Shape::kCylinder;
-      part.size_m = {random.uniform(0.05, 2.5), random.uniform(0.05, 2.5), random.uniform(0.05, 2.5)};
+      part.size_m = {random.uniform(0.05, 2.5), random.uniform(0.05, 2.5),
+                     random.uniform(0.05, 2.5)};
       part.T_O_P.translation() = Eigen::Vector3d(random.normal(), 0, 0);
       object.parts.push_back(part);
     }
@@ -118,8 +120,8 @@ TEST(Render, AgreesWithFaceByFaceIntersection) {
       const float depth = seen.depth_m.at<float>(v, u);
       const bool near_tie = std::abs(hit.second_m - hit.depth_m) < 1e-3;
       if (hit.object >= 0 && hit.depth_m < 15.0) {
-        // A ray that only grazes a part may hit or miss it in single precision: then the depth is far
-        // off, and only few rays do that. All others agree to the documented 1e-4 m.
+        // A ray that only grazes a part may hit or miss it in single precision: then the depth is
+        // far off, and only few rays do that. All others agree to the documented 1e-4 m.
         if (std::abs(depth - hit.depth_m) > 1e-4) {
           ++misses;
           continue;

@@ -11,8 +11,7 @@ namespace {
 
 const std::string kHead =
     "name: test\nrobots: [{name: r, path: {waypoints: [[0, 0], [1, 0]], closed: false}}]\n";
-const std::string kBox =
-    "objects: [{name: box, class: 7, at: [1, 2, 90], size: [1, 0.5, 2]}]\n";
+const std::string kBox = "objects: [{name: box, class: 7, at: [1, 2, 90], size: [1, 0.5, 2]}]\n";
 
 /// The text of the error that loading gives, "" for none.
 std::string error_of(const std::string& yaml) {
@@ -28,19 +27,22 @@ std::string error_of(const std::string& yaml) {
 
 TEST(ScenarioYaml, ReadsObjectsAndChanges) {
   const ScratchFolder folder;
-  folder.write("s.yaml", kHead + kBox +
-                             "visits:\n"
-                             "- {name: a}\n"
-                             "- name: b\n"
-                             "  changes:\n"
-                             "  - {move: box, by: [0.5, 0, 10]}\n"
-                             "  - {add: {name: new, class: 9, shape: cylinder, size: [1, 1, 2], at: [-2, 0, 0]}}\n"
-                             "- name: c\n"
-                             "  changes:\n"
-                             "  - {remove: box}\n"
-                             "  - {drive: new, track: [[0, -2, 0, 0], [5, -2, 3, 90]]}\n"
-                             "  - {pass: {name: p, class: 13, size: [0.4, 0.4, 1.7]}, track: [[0, 0, 0, 0], [3, 1, 1, 0]]}\n"
-                             "- {name: d}\n");
+  folder.write(
+      "s.yaml",
+      kHead + kBox +
+          "visits:\n"
+          "- {name: a}\n"
+          "- name: b\n"
+          "  changes:\n"
+          "  - {move: box, by: [0.5, 0, 10]}\n"
+          "  - {add: {name: new, class: 9, shape: cylinder, size: [1, 1, 2], at: [-2, 0, 0]}}\n"
+          "- name: c\n"
+          "  changes:\n"
+          "  - {remove: box}\n"
+          "  - {drive: new, track: [[0, -2, 0, 0], [5, -2, 3, 90]]}\n"
+          "  - {pass: {name: p, class: 13, size: [0.4, 0.4, 1.7]}, track: [[0, 0, 0, 0], [3, 1, 1, "
+          "0]]}\n"
+          "- {name: d}\n");
   const Scenario scenario = load_scenario(folder / "s.yaml");
   ASSERT_EQ(scenario.visits.size(), 4u);
   const OrientedBox box = objects_after(scenario, 1).at(0).box;
@@ -62,7 +64,8 @@ TEST(ScenarioYaml, ReadsObjectsAndChanges) {
 
 TEST(ScenarioYaml, LeaningThingsStandOnTheFloor) {
   const ScratchFolder folder;
-  folder.write("s.yaml", kHead + "objects: [{name: b, class: 7, size: [1, 0.1, 1.5], lean_deg: -20}]\n");
+  folder.write("s.yaml",
+               kHead + "objects: [{name: b, class: 7, size: [1, 0.1, 1.5], lean_deg: -20}]\n");
   const Scenario scenario = load_scenario(folder / "s.yaml");
   const OrientedBox box = objects_after(scenario, 0).at(0).box;
   EXPECT_NEAR(box.pose.position_W.z() - 0.5 * box.size_m.z(), 0.0, 1e-12);
@@ -98,7 +101,8 @@ TEST(ScenarioYaml, OneDefectOneLine) {
       {kHead + "objects: [{name: b, class: seven, size: [1, 2, 3]}]\n", "an integer"},
       {kHead + "objects: [{name: b, class: 7, size: [1, 2, 3], shape: cone}]\n", "'cone'"},
       {kHead + "objects: [{name: b, kind: k, size: [1, 2, 3]}]\n", "'k'"},
-      {kHead + "objects: [{name: b, class: 7, size: [1, 1, 1], at: [6.4, 0, 0]}]\n", "outside the area"},
+      {kHead + "objects: [{name: b, class: 7, size: [1, 1, 1], at: [6.4, 0, 0]}]\n",
+       "outside the area"},
       {kHead + kBox + "changes: [{remove: bax}]\n", "'bax'"},
       {kHead + kBox + "changes: [{move: box}]\n", "'by'"},
       {kHead + kBox + "changes: [{teleport: box}]\n", "none of"},

@@ -9,7 +9,8 @@
 namespace pocd {
 namespace {
 
-SceneObject box_object(const Eigen::Vector3d& base_m, double yaw_rad, const Eigen::Vector3d& size_m) {
+SceneObject box_object(const Eigen::Vector3d& base_m, double yaw_rad,
+                       const Eigen::Vector3d& size_m) {
   SceneObject object;
   object.T_W_O = upright_pose(base_m, yaw_rad);
   ScenePart part;
@@ -39,7 +40,8 @@ TEST(Scene, BoundingBoxOfLeaningCylinderTouchesItsSurface) {
   Eigen::Vector3d reach = Eigen::Vector3d::Zero();
   for (int i = 0; i < 6000; ++i) {
     const double a = 2.0 * M_PI * i / 6000;
-    const Eigen::Vector3d p = part.T_O_P * Eigen::Vector3d(0.2 * std::cos(a), 0.2 * std::sin(a), 0.5);
+    const Eigen::Vector3d p =
+        part.T_O_P * Eigen::Vector3d(0.2 * std::cos(a), 0.2 * std::sin(a), 0.5);
     reach = reach.cwiseMax(p.cwiseAbs());
   }
   EXPECT_NEAR((0.5 * box.size_m - reach).cwiseAbs().maxCoeff(), 0.0, 1e-6);
@@ -66,7 +68,8 @@ bool overlap_by_points(const OrientedBox& a, const OrientedBox& b) {
   for (int x = 0; x <= kSteps; ++x) {
     for (int y = 0; y <= kSteps; ++y) {
       for (int z = 0; z <= kSteps; ++z) {
-        const Eigen::Vector3d unit = Eigen::Vector3d(x, y, z) / kSteps - Eigen::Vector3d::Constant(0.5);
+        const Eigen::Vector3d unit =
+            Eigen::Vector3d(x, y, z) / kSteps - Eigen::Vector3d::Constant(0.5);
         const Eigen::Vector3d p = T_B_W * (T_W_A * a.size_m.cwiseProduct(unit));
         if ((p.cwiseAbs().array() < 0.5 * b.size_m.array()).all()) return true;
       }
@@ -81,7 +84,8 @@ TEST(Scene, OverlapAgreesWithPointSampling) {
   for (int i = 0; i < 300; ++i) {
     const auto draw = [&] {
       OrientedBox box;
-      box.pose.position_W = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-0.5, 0.5)};
+      box.pose.position_W = {random.uniform(-1, 1), random.uniform(-1, 1),
+                             random.uniform(-0.5, 0.5)};
       box.pose.yaw_rad = random.uniform(-3, 3);
       box.size_m = {random.uniform(0.3, 1.2), random.uniform(0.3, 1.2), random.uniform(0.3, 1.2)};
       return box;

@@ -65,8 +65,8 @@ TEST(SensorDepth, NeighboursShareTheConfiguredVariance) {
         }
       }
     }
-    // Adjacent pixels see almost the same smooth field (24 px cells): correlation = share, less a few
-    // thousandths. Standard error about 1 % as above; 0.04 is four of them.
+    // Adjacent pixels see almost the same smooth field (24 px cells): correlation = share, less a
+    // few thousandths. Standard error about 1 % as above; 0.04 is four of them.
     EXPECT_NEAR(product / squares, share, 0.04);
   }
 }

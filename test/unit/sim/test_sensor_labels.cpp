@@ -80,19 +80,22 @@ TEST(SensorPose, ErrorIsBoundedSlowAndNotConstant) {
   model.pose_error_period_s = 8.0;
   Pose truth = Pose::Identity();
   truth.translation() = Eigen::Vector3d(1, 2, 3);
-  truth.linear() = Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  truth.linear() =
+      Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
   double largest_m = 0.0, largest_deg = 0.0;
   Pose last = degrade_pose(model, {1, 0, 0}, 0.0, truth);
   for (int i = 1; i < 6000; ++i) {
     const Pose now = degrade_pose(model, {1, 0, 0}, i / 15.0, truth);
     const Eigen::Vector3d shift = now.translation() - truth.translation();
-    const double angle_deg = 180 / M_PI * Eigen::AngleAxisd(now.linear() * truth.linear().transpose()).angle();
+    const double angle_deg =
+        180 / M_PI * Eigen::AngleAxisd(now.linear() * truth.linear().transpose()).angle();
     EXPECT_LE(shift.head<2>().cwiseAbs().maxCoeff(), 0.03 + 1e-12);
     EXPECT_LE(std::abs(shift.z()), 0.01 + 1e-12);
     // Heading 0.3 degrees and a third of it about each other axis: at most 0.3 * sqrt(1 + 2 / 9).
     EXPECT_LE(angle_deg, 0.3316 + 1e-3);
     // The steepest slope of the blend is 1.5 per cell, over at most twice the amplitude.
-    EXPECT_LE((now.translation() - last.translation()).cwiseAbs().maxCoeff(), 0.06 * 1.5 / 8 / 15 + 1e-9);
+    EXPECT_LE((now.translation() - last.translation()).cwiseAbs().maxCoeff(),
+              0.06 * 1.5 / 8 / 15 + 1e-9);
     largest_m = std::max(largest_m, shift.norm());
     largest_deg = std::max(largest_deg, angle_deg);
     last = now;

@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 
 std::vector<fs::path> shipped() {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(fs::path(POCD_SOURCE_DIR) / "config/sim")) {
+  for (const auto& entry :
+       fs::recursive_directory_iterator(fs::path(POCD_SOURCE_DIR) / "config/sim")) {
     if (entry.path().extension() == ".yaml") files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
@@ -123,7 +124,8 @@ TEST_P(Shipped, EveryChangeIsInSight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Shipped, testing::ValuesIn(shipped()), [](const auto& info) {
-  std::string name = info.param.parent_path().filename().string() + "_" + info.param.stem().string();
+  std::string name =
+      info.param.parent_path().filename().string() + "_" + info.param.stem().string();
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 });
@@ -135,12 +137,12 @@ TEST(TorwicScenarios, ChangeWhatTheirDescriptionsSay) {
     double largest_step_m;
   };
   // From the circuit's text: 12 outer and 4 inner stacks, 4 fences.
-  const Expected table[] = {
-      {"0", 0, 0, 0, 0.0},    {"1-1", 3, 0, 0, 0.3},  {"1-2", 3, 0, 0, 0.6}, {"1-3", 3, 0, 0, 0.4},
-      {"1-4", 12, 0, 0, 0.4}, {"1-5", 16, 0, 0, 0.0}, {"1-6", 4, 0, 0, 0.3}, {"1-7", 16, 0, 0, 0.3},
-      {"1-8", 12, 0, 0, 0.35}, {"1-9", 12, 0, 0, 0.6}, {"2-1", 0, 3, 0, 0.0}, {"2-2", 0, 8, 0, 0.0},
-      {"2-3", 0, 16, 0, 0.0}, {"2-4", 0, 4, 0, 0.0},  {"3-1", 5, 0, 0, 0.4}, {"3-2", 11, 0, 0, 0.4},
-      {"3-3", 4, 0, 0, 0.5},  {"4-1", 0, 0, 8, 0.0}};
+  const Expected table[] = {{"0", 0, 0, 0, 0.0},    {"1-1", 3, 0, 0, 0.3},  {"1-2", 3, 0, 0, 0.6},
+                            {"1-3", 3, 0, 0, 0.4},  {"1-4", 12, 0, 0, 0.4}, {"1-5", 16, 0, 0, 0.0},
+                            {"1-6", 4, 0, 0, 0.3},  {"1-7", 16, 0, 0, 0.3}, {"1-8", 12, 0, 0, 0.35},
+                            {"1-9", 12, 0, 0, 0.6}, {"2-1", 0, 3, 0, 0.0},  {"2-2", 0, 8, 0, 0.0},
+                            {"2-3", 0, 16, 0, 0.0}, {"2-4", 0, 4, 0, 0.0},  {"3-1", 5, 0, 0, 0.4},
+                            {"3-2", 11, 0, 0, 0.4}, {"3-3", 4, 0, 0, 0.5},  {"4-1", 0, 0, 8, 0.0}};
   EXPECT_EQ(std::size(table), 18u);
   for (const Expected& expected : table) {
     const Scenario run = load_run({torwic("0"), torwic(expected.name)});
@@ -151,7 +153,8 @@ TEST(TorwicScenarios, ChangeWhatTheirDescriptionsSay) {
       removed += change.kind == ChangeKind::kRemoved;
       added += change.kind == ChangeKind::kAdded;
       if (change.kind != ChangeKind::kMoved) continue;
-      step_m = std::max(step_m, (change.after->pose.position_W - change.before->pose.position_W).norm());
+      step_m =
+          std::max(step_m, (change.after->pose.position_W - change.before->pose.position_W).norm());
     }
     EXPECT_EQ(moved, expected.moved) << expected.name;
     EXPECT_EQ(removed, expected.removed) << expected.name;

@@ -23,8 +23,8 @@ SceneObject box_object(const std::string& name, const Eigen::Vector3d& base_m,
   return object;
 }
 
-/// A robot that drives 0.5 m along +x towards a wall at x = 2, with a box in front of it and another
-/// hidden behind it.
+/// A robot that drives 0.5 m along +x towards a wall at x = 2, with a box in front of it and
+/// another hidden behind it.
 Scenario small_scenario() {
   Scenario scenario;
   scenario.name = "small";
@@ -61,8 +61,8 @@ TEST(Truth, VisibleSurfaceIsWhatTheCameraFaces) {
       EXPECT_EQ(voxel.x, 20);
     }
   }
-  // The near face of the front box lies at x = 1.41 and covers y in [-0.187, 0.213], z in [0, 0.6]: all
-  // of its voxels are seen, 5 in y and 6 in z. Its top is 10 cm above the camera and not seen.
+  // The near face of the front box lies at x = 1.41 and covers y in [-0.187, 0.213], z in [0, 0.6]:
+  // all of its voxels are seen, 5 in y and 6 in z. Its top is 10 cm above the camera and not seen.
   for (int y = -2; y <= 2; ++y) {
     for (int z = 0; z <= 5; ++z) EXPECT_TRUE(front.count({14, y, z})) << y << " " << z;
   }
@@ -85,7 +85,8 @@ TEST(Truth, VisibleSurfaceIsSortedAndTheSameForEveryPool) {
     EXPECT_TRUE(one[i].x == three[i].x && one[i].y == three[i].y && one[i].z == three[i].z &&
                 one[i].object == three[i].object);
     if (i == 0) continue;
-    EXPECT_LT(std::tie(one[i - 1].z, one[i - 1].y, one[i - 1].x), std::tie(one[i].z, one[i].y, one[i].x));
+    EXPECT_LT(std::tie(one[i - 1].z, one[i - 1].y, one[i - 1].x),
+              std::tie(one[i].z, one[i].y, one[i].x));
   }
 }
 

@@ -8,8 +8,8 @@
 
 namespace pocd {
 
-/// Makes `folder` with RGB/, Depth/, Segmentation/ and poses.txt. Depth is rounded to millimetres (above
-/// 65.534 m: no return). Not thread-safe.
+/// Makes `folder` with RGB/, Depth/, Segmentation/ and poses.txt. Depth is rounded to millimetres
+/// (above 65.534 m: no return). Not thread-safe.
 class TorwicWriter {
  public:
   /// Throws InputError when the folder cannot be made. T_B_C: camera in the robot's base frame.

@@ -21,8 +21,8 @@ struct PathSpec {
 /// turn_rate_rad_s allows. A lap ends where it began. Thread-safe once built.
 class RobotPath {
  public:
-  /// Throws InputError naming `source` for an impossible path: too few or repeated waypoints, speeds
-  /// not above 0, a corner radius that does not fit between two corners.
+  /// Throws InputError naming `source` for an impossible path: too few or repeated waypoints,
+  /// speeds not above 0, a corner radius that does not fit between two corners.
   RobotPath(const PathSpec& spec, const std::string& source);
 
   double duration_s() const { return duration_s_; }
@@ -32,9 +32,9 @@ class RobotPath {
  private:
   struct Piece {
     double duration_s;
-    Eigen::Vector2d from, to;            // line; for a turn on the spot from == to
-    double yaw0_rad, yaw1_rad;           // equal on a line
-    double signed_radius_m = 0.0;        // of an arc, > 0 to the left
+    Eigen::Vector2d from, to;      // line; for a turn on the spot from == to
+    double yaw0_rad, yaw1_rad;     // equal on a line
+    double signed_radius_m = 0.0;  // of an arc, > 0 to the left
   };
   void add_line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double speed_m_s);
 

@@ -1,4 +1,5 @@
-// A simulated run: a building, robots that drive through it, and visits between which things change.
+// A simulated run: a building, robots that drive through it, and visits between which things
+// change.
 #pragma once
 
 #include <string>
@@ -30,7 +31,7 @@ struct Scenario {
   CameraExtrinsics extrinsics;  ///< T_B_C of every robot
   double base_height_m = 0.4;   ///< of the robots' base frame above the floor
   double frame_rate_hz = 15.0;
-  double visit_gap_s = 1.0;     ///< time between the last frame of a visit and the first of the next
+  double visit_gap_s = 1.0;  ///< time between the last frame of a visit and the first of the next
   Eigen::Vector2d area_low_m = {-6.5, -6.5}, area_high_m = {6.5, 6.5};  ///< inside of the walls
   std::vector<SceneObject> fixtures;
   std::vector<SimRobot> robots;
@@ -38,9 +39,9 @@ struct Scenario {
   std::vector<SimVisit> visits;
 };
 
-/// Camera and mount of TorWIC's front camera (method.md): 640x360, pitched up by 15 degrees. The base
-/// frame is put 0.4 m above the floor, so the lens is at 0.41 m and sees a 2 m stack, 0.7 m to its
-/// side, from 1 m ahead on.
+/// Camera and mount of TorWIC's front camera (method.md): 640x360, pitched up by 15 degrees. The
+/// base frame is put 0.4 m above the floor, so the lens is at 0.41 m and sees a 2 m stack, 0.7 m to
+/// its side, from 1 m ahead on.
 CameraModel torwic_camera();
 CameraExtrinsics torwic_extrinsics();
 
@@ -49,16 +50,17 @@ std::vector<SceneObject> make_building(const Eigen::Vector2d& low_m, const Eigen
                                        double wall_height_m, ClassId floor_class,
                                        ClassId wall_class);
 
-/// Visits of several scenarios one after the other. Robots, camera and building are the first one's;
-/// throws InputError, naming the scenario, when another has a different camera, mount, frame rate or
-/// set of robots.
+/// Visits of several scenarios one after the other. Robots, camera and building are the first
+/// one's; throws InputError, naming the scenario, when another has a different camera, mount, frame
+/// rate or set of robots.
 Scenario concatenate(const std::vector<Scenario>& scenarios);
 
 /// Everything there at time_s after the start of a visit: fixtures first, then objects.
 Scene scene_at(const Scenario& scenario, std::size_t visit, double time_s);
 
 /// Throws InputError naming `scenario.name` and the field: no visit, no robot, repeated names of
-/// objects or robots, an object without parts or outside the area, a camera or path that is not valid.
+/// objects or robots, an object without parts or outside the area, a camera or path that is not
+/// valid.
 void validate(const Scenario& scenario);
 
 }  // namespace pocd

@@ -2,15 +2,16 @@
 //
 //   name: "1-1"                     # required
 //   description: text
-//   base: 0.yaml                    # beside this file: everything of it holds unless given here; its
+//   base: 0.yaml                    # beside this file: everything of it holds unless given here;
+//   its
 //                                   # objects are as at the end of its last visit
 //   camera: {width, height, fx, fy, cx, cy}                      # default: TorWIC's
-//   mount: {translation: [x, y, z], quaternion_xyzw: [...]}      # camera optical frame in base frame
-//   mount: {translation: [x, y, z], yaw_deg: 0, pitch_deg: 15}   # or so; pitch up is positive
-//   base_height_m, frame_rate_hz, visit_gap_s
-//   area: {low: [x, y], high: [x, y], wall_height_m: 4, floor_class: 1, wall_class: 0}
-//   sensor: perfect                 # or: stereo, or a map of SensorModel fields over stereo's
-//   robots: [{name: r1, path: {waypoints: [[x, y], ...], closed: true, speed_m_s: 0.8,
+//   mount: {translation: [x, y, z], quaternion_xyzw: [...]}      # camera optical frame in base
+//   frame mount: {translation: [x, y, z], yaw_deg: 0, pitch_deg: 15}   # or so; pitch up is
+//   positive base_height_m, frame_rate_hz, visit_gap_s area: {low: [x, y], high: [x, y],
+//   wall_height_m: 4, floor_class: 1, wall_class: 0} sensor: perfect                 # or: stereo,
+//   or a map of SensorModel fields over stereo's robots: [{name: r1, path: {waypoints: [[x, y],
+//   ...], closed: true, speed_m_s: 0.8,
 //             turn_rate_deg_s: 69, corner_radius_m: 0, start_m: 0, laps: 1}}]
 //   kinds: {stack: {class: 7, ...}} # fields shared by objects that say `kind: stack`
 //   objects: [{name, kind, class, stationarity: 0, at: [x, y, yaw_deg], z: 0, lean_deg: 0,
@@ -21,8 +22,8 @@
 // A change is one of
 //   {move: NAME or [NAMES], by: [dx, dy, dyaw_deg]}    {move: NAME, to: [x, y, yaw_deg]}
 //   {remove: NAME or [NAMES]}                          {add: OBJECT}
-//   {drive: NAME, track: [[time_s, x, y, yaw_deg], ...]}   moves during the visit and stays at the end
-//   {pass: OBJECT, track: [...]}                           is there only while its track lasts
+//   {drive: NAME, track: [[time_s, x, y, yaw_deg], ...]}   moves during the visit and stays at the
+//   end {pass: OBJECT, track: [...]}                           is there only while its track lasts
 #pragma once
 
 #include <filesystem>

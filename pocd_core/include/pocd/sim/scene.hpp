@@ -1,5 +1,5 @@
-// An analytic world: solid boxes and upright cylinders, grouped to objects. Depth seen by a camera is
-// exact, so that tests and evaluation have a truth that no renderer's mesh or sampling blurs.
+// An analytic world: solid boxes and upright cylinders, grouped to objects. Depth seen by a camera
+// is exact, so that tests and evaluation have a truth that no renderer's mesh or sampling blurs.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +32,8 @@ struct TrackPoint {
   double yaw_rad = 0.0;
 };
 
-/// A named thing. Its frame O stands on the floor: origin at the middle of the base, z up unless the
-/// thing leans.
+/// A named thing. Its frame O stands on the floor: origin at the middle of the base, z up unless
+/// the thing leans.
 struct SceneObject {
   std::string name;
   ClassId class_id = 0;

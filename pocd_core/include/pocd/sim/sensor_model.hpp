@@ -8,8 +8,8 @@
 
 namespace pocd {
 
-/// Every effect can be switched off by its own field (0). The same seed and frame number give the same
-/// errors, whatever was rendered before.
+/// Every effect can be switched off by its own field (0). The same seed and frame number give the
+/// same errors, whatever was rendered before.
 struct SensorModel {
   double depth_base_m = 0.002;
   double depth_quadratic_per_m = 0.0025;
@@ -55,7 +55,8 @@ struct SensorModel {
           "Pixels this near to a depth edge, on its far side, lose their return [px].");
     visit("edge_hole_probability", edge_hole_probability, Range{0.0, 1.0},
           "Probability that such a pixel has no return.");
-    visit("quantum_m", quantum_m, Range{0.0, 0.1}, "Depth is rounded to multiples of this [m]; 0: not.");
+    visit("quantum_m", quantum_m, Range{0.0, 0.1},
+          "Depth is rounded to multiples of this [m]; 0: not.");
     visit("min_range_m", min_range_m, Range{0.0, 5.0}, "No return below this depth [m].");
     visit("max_range_m", max_range_m, Range{0.1, 1000.0}, "No return above this depth [m].");
     visit("label_border_px", label_border_px, Range{0.0, 20.0},
@@ -70,13 +71,16 @@ struct SensorModel {
           "Frames of one robot for which aliasing stays as it is.");
     visit("alias_class_a", alias_class_a, Range{0, 65535}, "Class a of the aliasing.");
     visit("alias_class_b", alias_class_b, Range{0, 65535}, "Class b of the aliasing.");
-    visit("position_error_m", position_error_m, Range{0.0, 1.0},
-          "Amplitude of the slowly varying error of the position, per axis; a third of it in z [m].");
+    visit(
+        "position_error_m", position_error_m, Range{0.0, 1.0},
+        "Amplitude of the slowly varying error of the position, per axis; a third of it in z [m].");
     visit("rotation_error_deg", rotation_error_deg, Range{0.0, 20.0},
-          "Amplitude of the slowly varying error of the heading; a third of it in roll, pitch [deg].");
+          "Amplitude of the slowly varying error of the heading; a third of it in roll, pitch "
+          "[deg].");
     visit("pose_error_period_s", pose_error_period_s, Range{0.1, 1000.0},
           "Time in which the pose error changes to an independent one [s].");
-    visit("color_noise", color_noise, Range{0.0, 100.0}, "Noise of the colour image, one sigma [0-255].");
+    visit("color_noise", color_noise, Range{0.0, 100.0},
+          "Noise of the colour image, one sigma [0-255].");
   }
 };
 
@@ -97,8 +101,8 @@ void degrade_labels(const SensorModel& model, const NoiseKey& key, int label_div
 /// Adds noise to a BGR image in place.
 void degrade_color(const SensorModel& model, const NoiseKey& key, cv::Mat& color);
 
-/// True camera pose to the one the localisation reports at time_s. The error is a rotation about the
-/// camera's position and a shift, both bounded by their amplitudes.
+/// True camera pose to the one the localisation reports at time_s. The error is a rotation about
+/// the camera's position and a shift, both bounded by their amplitudes.
 Pose degrade_pose(const SensorModel& model, const NoiseKey& key, double time_s, const Pose& T_W_C);
 
 }  // namespace pocd

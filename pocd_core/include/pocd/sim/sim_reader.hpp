@@ -16,7 +16,7 @@ struct SimFrameTime {
   StampNs stamp_ns = 0;
   std::size_t visit = 0;
   std::size_t robot = 0;
-  std::size_t robot_frame = 0;  ///< number within the robot's frames of this visit
+  std::size_t robot_frame = 0;     ///< number within the robot's frames of this visit
   std::size_t robot_sequence = 0;  ///< number within the robot's frames of the run
   double visit_time_s = 0.0;
 };
@@ -41,9 +41,10 @@ class SimSchedule {
 
 struct SimReaderOptions {
   std::uint64_t seed = 1;
-  int label_divisor = 1;  ///< > 1: labels are class * label_divisor + instance (1, 2, ... per class)
+  int label_divisor =
+      1;  ///< > 1: labels are class * label_divisor + instance (1, 2, ... per class)
   bool with_color = true;
-  int threads = 1;        ///< of the renderer; frames do not depend on it
+  int threads = 1;  ///< of the renderer; frames do not depend on it
 };
 
 /// next() walks through the run; frame(i) gives any frame, and the same one every time.

@@ -33,9 +33,9 @@ struct TruthChange {
 /// transient.
 std::vector<TruthObject> objects_after(const Scenario& scenario, std::size_t visit);
 
-/// Changes from the end of visit - 1 to the end of `visit` (visit >= 1), by name: removed and moved in
-/// the order of the earlier visit, then added. MOVED: centre by more than 1 mm or heading by more than
-/// 0.1 degrees. A thing whose class or size changed is REMOVED and ADDED.
+/// Changes from the end of visit - 1 to the end of `visit` (visit >= 1), by name: removed and moved
+/// in the order of the earlier visit, then added. MOVED: centre by more than 1 mm or heading by
+/// more than 0.1 degrees. A thing whose class or size changed is REMOVED and ADDED.
 std::vector<TruthChange> changes_of(const Scenario& scenario, std::size_t visit);
 
 /// One voxel of true surface. Voxel (x, y, z) covers [x, x + 1) voxel_size_m and so on.
@@ -54,8 +54,8 @@ struct VisibleSurfaceOptions {
 /// Voxels that contain a surface point which some ideal camera of the visit saw within max_depth_m,
 /// over the drives of all robots; things that move during the visit or are transient hide what is
 /// behind them but give no voxels. Rays are at least two per voxel edge at max_depth_m for surfaces
-/// seen face on. A voxel touched by several objects belongs to the one first in the scene. Sorted by
-/// z, y, x. Same result for every pool, or none.
+/// seen face on. A voxel touched by several objects belongs to the one first in the scene. Sorted
+/// by z, y, x. Same result for every pool, or none.
 std::vector<SurfaceVoxel> visible_surface(const Scenario& scenario, std::size_t visit,
                                           const VisibleSurfaceOptions& options,
                                           ThreadPool* pool = nullptr);
