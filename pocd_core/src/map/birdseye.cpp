@@ -159,6 +159,18 @@ std::array<std::uint8_t, 3> stationarity_color(double score) {
   return color;
 }
 
+AppearanceOf appearance_by_stationarity(const std::vector<ObjectSnapshot>& objects) {
+  std::map<std::uint32_t, OwnerAppearance> known;
+  for (const ObjectSnapshot& object : objects) {
+    const auto bgr = stationarity_color(object.belief.stationarity());
+    known[to_index(object.id)] = {{bgr[2], bgr[1], bgr[0]}, object.class_id};
+  }
+  return [known](std::uint32_t owner) {
+    const auto it = known.find(owner);
+    return it == known.end() ? OwnerAppearance{} : it->second;
+  };
+}
+
 cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
                       const BirdseyeOptions& options) {
   POCD_CHECK(options.size_px >= 400);

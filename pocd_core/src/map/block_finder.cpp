@@ -12,6 +12,8 @@ namespace {
 // Bounds the memory of the grid; 64 M cells are a 100 m range with 3 cm voxels.
 constexpr double kMaxCells = 64e6;
 
+constexpr std::uint32_t kNoOwner = 0;
+
 // Points along a ray through the band: at most half a block apart, so that a block that lies
 // between two points is cut at a corner only and neighbouring rays find it.
 float points_along_band(const TsdfConfig& config, const CameraModel& camera) {
@@ -64,6 +66,13 @@ void BlockFinder::scan(const TsdfConfig& config, const IntegrationInput& input, 
   const CameraModel& camera = input.frame->camera;
   const double block_px = block_m_ * std::min(camera.fx, camera.fy) / config.max_depth_m;
   step_px_ = block_px >= 12.0 ? 4 : block_px >= 6.0 ? 2 : 1;
+  columns_.clear();
+  owner_columns_.clear();
+  for (int u = step_px_ / 2; u < camera.width; u += step_px_) {
+    columns_.push_back(u);
+    owner_columns_.push_back(input.owners ? std::min(u / input.owner_stride, input.owner_width - 1)
+                                          : 0);
+  }
   tiles_x_ = (camera.width + kTile_px - 1) / kTile_px;
   tiles_y_ = (camera.height + kTile_px - 1) / kTile_px;
   tile_far_.assign(static_cast<std::size_t>(tiles_x_) * tiles_y_, 0.0f);
@@ -88,6 +97,8 @@ void BlockFinder::scan_tile_row(int tile_row) {
   const int points = static_cast<int>(row.samples) + 1;
   const float max_depth = static_cast<float>(config_.max_depth_m);
   float* far = tile_far_.data() + static_cast<std::ptrdiff_t>(tile_row) * tiles_x_;
+  const int samples = static_cast<int>(columns_.size());
+  const auto per_tile = static_cast<unsigned>(kTile_px / step_px_);
   alignas(64) float depth[kBandBatch];
   std::int32_t* cells = cells_.data() + static_cast<std::ptrdiff_t>(tile_row) * points * kBandBatch;
 
@@ -105,26 +116,20 @@ void BlockFinder::scan_tile_row(int tile_row) {
         input_->owners
             ? input_->owners + static_cast<std::ptrdiff_t>(input_->owner_width) *
                                    std::min(v / input_->owner_stride, input_->owner_height - 1)
-            : nullptr;
-    int first_u = step_px_ / 2;
-    while (first_u < camera.width) {
-      int count = 0;
-      for (int u = first_u; u < camera.width && count < kBandBatch; u += step_px_, ++count) {
-        float d = image_row[u];
-        if (!(d > 0.0f && d <= max_depth)) d = 0.0f;
-        if (owner_row && owner_row[std::min(u / input_->owner_stride, input_->owner_width - 1)] ==
-                             IntegrationInput::kSkip) {
-          d = 0.0f;
-        }
-        depth[count] = d;
-        far[u / kTile_px] = std::max(far[u / kTile_px], d);
+            : &kNoOwner;
+    for (int first = 0; first < samples; first += kBandBatch) {
+      const int count = std::min(kBandBatch, samples - first);
+      sample_row(image_row, owner_row, columns_.data() + first, owner_columns_.data() + first,
+                 max_depth, count, depth);
+      for (int i = 0; i < count; ++i) {
+        float& tile = far[static_cast<unsigned>(first + i) / per_tile];
+        tile = depth[i] > tile ? depth[i] : tile;
       }
-      band_cells(row, depth, count, static_cast<float>(first_u), static_cast<float>(step_px_),
-                 cells);
+      band_cells(row, depth, count, static_cast<float>(columns_[first]),
+                 static_cast<float>(step_px_), cells);
       for (int i = 0; i < points * count; ++i) {
         marks_[cells[i]].store(1, std::memory_order_relaxed);
       }
-      first_u += count * step_px_;
     }
   }
 }

@@ -41,7 +41,8 @@ class BlockFinder {
   TsdfConfig config_;
   double block_m_ = 0.0;
   int step_px_ = 4;
-  BlockKey first_;  // key of cell (0, 0, 0)
+  std::vector<std::int32_t> columns_, owner_columns_;  // of the sampled pixels
+  BlockKey first_;                                     // key of cell (0, 0, 0)
   int size_x_ = 0, size_y_ = 0, size_z_ = 0;
   std::vector<std::atomic<std::uint8_t>> marks_;
   int tiles_x_ = 0, tiles_y_ = 0;

@@ -192,6 +192,19 @@ BlockOutcome integrate_block(const KernelFrame& frame, float x, float y, float z
   return outcome;
 }
 
+POCD_KERNEL void sample_row(const float* __restrict depth_row,
+                            const std::uint32_t* __restrict owner_row,
+                            const std::int32_t* __restrict columns,
+                            const std::int32_t* __restrict owner_columns, float max_depth,
+                            int count, float* __restrict out) {
+  for (int i = 0; i < count; ++i) {
+    const float d = depth_row[columns[i]];
+    const float in_range = d <= max_depth ? d : 0.0f;
+    const float seen = d > 0.0f ? in_range : 0.0f;
+    out[i] = owner_row[owner_columns[i]] != IntegrationInput::kSkip ? seen : 0.0f;
+  }
+}
+
 POCD_KERNEL void band_cells(const BandRow& row, const float* depth, int count, float first_column,
                             float step, std::int32_t* cells) {
   const float ox = row.origin[0], oy = row.origin[1], oz = row.origin[2];

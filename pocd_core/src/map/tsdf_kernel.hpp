@@ -65,6 +65,12 @@ struct BandRow {
 };
 constexpr int kBandBatch = 256;
 
+/// Depth at `count` columns of an image row, 0 where it is not usable or its owner is kSkip.
+void sample_row(const float* __restrict depth_row, const std::uint32_t* __restrict owner_row,
+                const std::int32_t* __restrict columns,
+                const std::int32_t* __restrict owner_columns, float max_depth, int count,
+                float* __restrict out);
+
 /// depth: `count` <= kBandBatch samples, 0 where nothing is to be done; first column and step say
 /// which columns they are. cells gets (samples + 1) * count grid indices, 0 for unused samples.
 void band_cells(const BandRow& row, const float* depth, int count, float first_column, float step,
