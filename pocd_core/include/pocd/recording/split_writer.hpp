@@ -1,0 +1,48 @@
+// A recording in several files.
+#pragma once
+
+#include "pocd/recording/mcap_writer.hpp"
+
+namespace pocd::recording {
+
+struct SplitOptions {
+  McapWriterOptions mcap;
+  std::uint64_t most_bytes = 0;        ///< a new file begins beyond this size; 0: never
+  std::uint64_t most_duration_ns = 0;  ///< or beyond this span of log times; 0: never
+};
+
+/// Writes to `path`, or when splitting to path_0000.mcap, path_0001.mcap ... Every file is
+/// complete: it has all schemas and channels, under the same numbers. Not thread-safe; errors as
+/// McapWriter.
+class SplitWriter {
+ public:
+  SplitWriter(std::filesystem::path path, SplitOptions options);
+
+  std::uint16_t add_schema(const std::string& name, const std::string& encoding,
+                           const std::string& data);
+  std::uint16_t add_channel(std::uint16_t schema, const std::string& topic,
+                            const std::string& message_encoding,
+                            const std::map<std::string, std::string>& metadata);
+  void write(const MessageHeader& header, const std::uint8_t* data, std::size_t size);
+  void flush() { writer_->flush(); }
+  void close() { writer_->close(); }
+
+  /// Of all files so far.
+  std::uint64_t bytes_written() const { return bytes_before_ + writer_->bytes_written(); }
+  const std::vector<std::filesystem::path>& files() const { return files_; }
+
+ private:
+  void open_next();
+
+  std::filesystem::path path_;
+  SplitOptions options_;
+  std::vector<SchemaRecord> schemas_;
+  std::vector<ChannelRecord> channels_;
+  std::unique_ptr<McapWriter> writer_;
+  std::vector<std::filesystem::path> files_;
+  std::uint64_t bytes_before_ = 0;
+  std::uint64_t first_ns_ = 0;
+  bool empty_ = true;  // no message in the present file
+};
+
+}  // namespace pocd::recording

@@ -1,0 +1,168 @@
+// A recorder that is killed, a disk that fills up, a recording in parts.
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "pocd/common/check.hpp"
+#include "pocd/recording/split_writer.hpp"
+#include "recordings.hpp"
+
+namespace pocd::recording {
+namespace {
+
+/// Runs `body` in a process of its own; its exit code, or 128 + signal.
+template <class Body>
+int in_child(Body body) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    int code = 99;
+    try {
+      code = body();
+    } catch (...) {
+    }
+    ::_exit(code);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+TEST(KilledRecorder, LeavesAReadableFile) {
+  const TemporaryFolder folder;
+  Random random(2);
+  for (int trial = 0; trial < 10; ++trial) {
+    const auto file = folder / ("killed" + std::to_string(trial) + ".mcap");
+    const std::uint64_t messages = 50 + random.below(400);
+    const int code = in_child([&] {
+      McapWriterOptions options;
+      options.chunk_bytes = 4000;
+      McapWriter writer(file, options);
+      const auto channel = writer.add_channel(0, "/a", "cdr", {});
+      const Bytes data(500, 7);
+      for (std::uint32_t i = 0; i < messages; ++i)
+        writer.write({channel, i, i, i}, data.data(), 500);
+      ::raise(SIGKILL);
+      return 0;
+    });
+    ASSERT_EQ(code, 128 + SIGKILL);
+    const auto reader = open_recording(file);
+    EXPECT_TRUE(reader->info().recovered);
+    const std::vector<Kept> kept = read_all(*reader);
+    // All but the chunk that was being filled: 7 messages of 500 bytes fit in 4000.
+    ASSERT_LE(kept.size(), messages);
+    EXPECT_GE(kept.size() + 7, messages);
+    for (std::size_t i = 0; i < kept.size(); ++i) ASSERT_EQ(kept[i].sequence, i);
+  }
+}
+
+/// Writes until that fails; 3 when it fails with a clear error and a closed file.
+int write_until_full(const std::filesystem::path& file) {
+  McapWriterOptions options;
+  options.chunk_bytes = 5000;
+  options.compression = "";
+  McapWriter writer(file, options);
+  const auto channel = writer.add_channel(0, "/a", "cdr", {});
+  const Bytes data(500, 7);
+  try {
+    for (std::uint32_t i = 0; i < 10'000; ++i) writer.write({channel, i, i, i}, data.data(), 500);
+  } catch (const InputError& error) {
+    const std::string what = error.what();
+    const bool clear = what.find("full.mcap: ") != std::string::npos &&
+                       what.find(" at byte ") != std::string::npos &&
+                       what.find("the file is closed and readable") != std::string::npos;
+    return clear && !writer.is_open() ? 3 : 4;
+  }
+  return 5;
+}
+
+/// The file is whole, and uses the room there was.
+int check_full(const std::filesystem::path& file) {
+  const auto reader = open_recording(file);
+  const bool whole = !reader->info().recovered && reader->problem_count() == 0 &&
+                     read_all(*reader).size() == reader->info().messages;
+  const bool used = reader->info().bytes <= 100'000 && reader->info().bytes > 80'000;
+  return whole && used ? 3 : 6;
+}
+
+TEST(FullDisk, EndsWithAnErrorAndAClosedFile) {
+  const TemporaryFolder folder;
+  const auto file = folder / "full.mcap";
+  // A limit of the file's size stands for the end of the disk where nothing may be mounted.
+  const int code = in_child([&] {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{100'000, 100'000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    return write_until_full(file);
+  });
+  EXPECT_EQ(code, 3);
+  EXPECT_EQ(check_full(file), 3);
+  try {
+    McapWriter writer("/dev/full");
+    FAIL() << "/dev/full took a header";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("/dev/full: cannot be written at byte 0"),
+              std::string::npos);
+  }
+}
+
+TEST(FullDisk, KeepsRoomForTheIndexOnARealFileSystem) {
+  const TemporaryFolder folder;
+  const int code = in_child([&] {
+    if (::unshare(CLONE_NEWNS) != 0 ||
+        ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        ::mount("tmpfs", folder.path().c_str(), "tmpfs", 0, "size=98304") != 0) {
+      return 77;
+    }
+    const int written = write_until_full(folder / "full.mcap");
+    return written == 3 ? check_full(folder / "full.mcap") : written;
+  });
+  if (code == 77) GTEST_SKIP() << "no file system may be mounted here";
+  EXPECT_EQ(code, 3);
+}
+
+TEST(SplitWriter, SplitsBySizeAndTime) {
+  const TemporaryFolder folder;
+  for (const bool by_size : {true, false}) {
+    const std::string name = by_size ? "size" : "time";
+    SplitOptions options;
+    options.mcap.chunk_bytes = 2000;
+    options.mcap.compression = "";
+    (by_size ? options.most_bytes : options.most_duration_ns) = by_size ? 20'000 : 100;
+    SplitWriter writer(folder / (name + ".mcap"), options);
+    const auto schema = writer.add_schema("a", "ros2msg", "uint8 a\n");
+    const auto a = writer.add_channel(schema, "/a", "cdr", {{"k", "v"}});
+    const Bytes data(300, 1);
+    for (std::uint32_t i = 0; i < 500; ++i) {
+      writer.write({a, i, 1000 + i, 0}, data.data(), data.size());
+      if (i == 250) writer.add_channel(schema, "/late", "cdr", {});
+    }
+    writer.close();
+    EXPECT_GE(writer.files().size(), 5u);
+    EXPECT_LE(writer.files().size(), 10u);
+    EXPECT_EQ(writer.files()[0].filename(), name + "_0000.mcap");
+    std::uint32_t next = 0;
+    std::uint64_t bytes = 0;
+    for (const auto& file : writer.files()) {
+      bytes += std::filesystem::file_size(file);
+      const auto reader = open_recording(file);
+      EXPECT_EQ(reader->problem_count(), 0u);
+      EXPECT_EQ(reader->channels()[0].metadata.at("k"), "v");
+      if (by_size) {
+        EXPECT_LT(reader->info().bytes, 24'000u);
+      } else {
+        EXPECT_LT(reader->info().end_ns - reader->info().start_ns, 100u);
+      }
+      for (const Kept& kept : read_all(*reader)) ASSERT_EQ(kept.sequence, next++);
+    }
+    EXPECT_EQ(next, 500u);
+    EXPECT_EQ(bytes, writer.bytes_written());
+  }
+}
+
+}  // namespace
+}  // namespace pocd::recording
