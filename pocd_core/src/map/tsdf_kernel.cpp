@@ -163,6 +163,10 @@ void carve(const KernelFrame& f, float bx, float by, float bz, const std::int32_
     block.tsdf[i] = static_cast<std::int16_t>(t);
     block.weight[i] = static_cast<std::uint16_t>(std::max(w, 1));
     if (t >= kFreeTsdf) {
+      // As well known as free space gets: with less it would leave a hole in the surface next to
+      // it.
+      block.weight[i] =
+          static_cast<std::uint16_t>(std::min(f.max_weight, static_cast<float>(kFreeWeight)));
       block.owner[i] = 0;
     } else {
       outcome.has_surface = true;

@@ -89,7 +89,10 @@ void ReferenceIntegrator::fuse(const IntegrationInput& input, VoxelBlock& block)
       const int w = weight / 2;
       tsdf = static_cast<std::int16_t>((tsdf * w + 32767) / (w + 1));
       weight = static_cast<std::uint16_t>(std::max(w, 1));
-      if (tsdf >= kFree) owner = 0;
+      if (tsdf >= kFree) {
+        weight = static_cast<std::uint16_t>(std::min(cap, kFreeWeight));
+        owner = 0;
+      }
       continue;
     }
     const float w = weight;
