@@ -52,7 +52,7 @@ Cells belief_cells(const Belief& belief) {
 }
 
 constexpr const char* kObjectsHeader =
-    "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,stationarity,alpha,beta,"
+    "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,box_z,stationarity,alpha,beta,"
     "mu,sigma,first_seen_ns,last_seen_ns,observations,last_robot";
 constexpr const char* kEventsHeader =
     "sequence,stamp_ns,kind,object_id,class,class_name,robot,frame,x,y,z,yaw,size_x,size_y,size_z,"
@@ -79,13 +79,16 @@ void CsvFile::close() {
   if (!out_) throw InputError(path_.string() + ": cannot be written in full");
 }
 
-void write_objects_csv(const std::vector<ObjectSnapshot>& objects, const ClassMap& classes,
+void write_objects_csv(const std::vector<ObjectSnapshot>& objects, const ClassNameOf& class_name,
                        const std::filesystem::path& file) {
   CsvFile csv(file, kObjectsHeader);
   for (const ObjectSnapshot& object : objects) {
     Cells cells{std::to_string(to_index(object.id)), std::to_string(object.class_id),
-                classes.name(object.class_id), std::to_string(object.stationarity_class)};
-    append(cells, box_cells(object.box));
+                class_name(object.class_id), std::to_string(object.stationarity_class)};
+    const Pose4 pose = object.pose();
+    append(cells, {length(pose.position_W.x()), length(pose.position_W.y()), length(pose.position_W.z()),
+                   length(pose.yaw_rad), length(object.box.size_m.x()), length(object.box.size_m.y()),
+                   length(object.box.size_m.z()), length(object.box.pose.position_W.z())});
     append(cells, belief_cells(object.belief));
     append(cells, {std::to_string(object.first_seen_ns), std::to_string(object.last_seen_ns),
                    std::to_string(object.observations), object.last_robot});
@@ -94,17 +97,16 @@ void write_objects_csv(const std::vector<ObjectSnapshot>& objects, const ClassMa
   csv.close();
 }
 
-EventsCsv::EventsCsv(const std::filesystem::path& file, const ClassMap& classes)
-    : file_(file, kEventsHeader), classes_(classes) {}
+EventsCsv::EventsCsv(const std::filesystem::path& file) : file_(file, kEventsHeader) {}
 
-void EventsCsv::add(const ObjectEvent& event) {
+void EventsCsv::add(const ObjectEvent& event, const std::string& class_name) {
   const Evidence& evidence = event.evidence;
   Cells cells{std::to_string(event.sequence),
               std::to_string(event.stamp_ns),
               to_string(event.kind),
               std::to_string(to_index(event.object)),
               std::to_string(event.class_id),
-              classes_.name(event.class_id),
+              class_name,
               event.robot,
               std::to_string(event.frame_sequence)};
   append(cells, box_cells(event.box));

@@ -13,6 +13,8 @@ namespace {
 constexpr double kMajority = 0.5;
 /// Points of an established object must have been measured in this many frames to bear witness.
 constexpr int kEstablishedHits = 2;
+/// An observation that adds at least this share of points shows that the object is not seen whole yet.
+constexpr double kGrowingShare = 0.03;
 /// A known object slid along itself when it lost and gained at least this share of its points.
 constexpr double kSlidShare = 0.12;
 
@@ -142,7 +144,9 @@ void ObjectTracker::erode(Step& step) {
 
 void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) {
   const Observation& observation = step.observations.list[index];
-  object.gained += static_cast<std::size_t>(object.model.fuse(observation.points));
+  const int added = object.model.fuse(observation.points);
+  object.gained += static_cast<std::size_t>(added);
+  object.growing = added > kGrowingShare * static_cast<double>(object.model.surfels().size());
   object.icp_target.reset();
   ++object.observations;
   object.last_seen_ns = step.frame.stamp_ns;
@@ -156,16 +160,18 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) 
 }
 
 void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
-  Points points;
+  Points points, normals;
   const int min_hits = object.observations > 4 ? kEstablishedHits : 1;
   for (const Surfel& s : object.model.surfels()) {
-    if (s.hits >= min_hits && s.seen_through < 3) points.push_back(s.point_W);
+    if (s.hits < min_hits || s.seen_through >= 3) continue;
+    points.push_back(s.point_W);
+    normals.push_back(s.normal_W);
   }
   if (points.size() < 3) return;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const auto& p : points) sum += p.cast<double>();
   object.centroid_W = sum / static_cast<double>(points.size());
-  OrientedBox box = fit_box(points, 0.005);
+  OrientedBox box = fit_box(points, normals, 0.005);
   // The ground band was cut off: what stands on the ground reaches it.
   if (step.ground.known()) {
     const double ground_m = step.ground.height_at(static_cast<float>(box.pose.position_W.x()),
@@ -283,15 +289,25 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   object.confirmed = true;
   object.reported_box = object.box;
   object.gained = object.lost = 0;
-  const auto removed = relocations_.take(object.class_id, object.box, step.frame.stamp_ns,
-                                         config_.state.relocation_window_s, like_size_slack_m());
-  if (!removed) {
+  const RelocationMemory::Removed* removed = removed_like(step, object);
+  const bool whole = removed && alike(removed->box, object.box, like_size_slack_m());
+  if (!removed || !(whole || object.growing)) {
     mark_changed(object);
     add_event(step, EventKind::kAdded, object, "confirmed");
+    object.added_ns = step.frame.stamp_ns;
     return;
   }
-  take_identity(step, object, removed->id, removed->first_seen_ns);
-  add_event(step, EventKind::kMoved, object, "found_again").previous_box = removed->box;
+  const OrientedBox previous_box = removed->box;
+  const ObjectId id = removed->id;
+  const StampNs first_seen_ns = removed->first_seen_ns;
+  relocations_.forget(id);
+  take_identity(step, object, id, first_seen_ns);
+  add_event(step, EventKind::kMoved, object, "found_again").previous_box = previous_box;
+}
+
+const RelocationMemory::Removed* ObjectTracker::removed_like(const Step& step, const LibraryObject& object) {
+  return relocations_.find(object.class_id, object.box, step.frame.stamp_ns, config_.state.relocation_window_s,
+                           config_.state.relocation_reach_m, like_size_slack_m());
 }
 
 void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns) {
@@ -305,6 +321,25 @@ void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id
   object.first_seen_ns = first_seen_ns;
   object.changed = false;  // it was listed under its old id
   mark_changed(object);
+}
+
+LibraryObject* ObjectTracker::added_like(const Step& step, const LibraryObject& object) {
+  LibraryObject* best = nullptr;
+  double best_distance = 0.0;
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  for (const ObjectId id : library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
+    LibraryObject* other = library_.find(id);
+    if (other == &object || !other->added_ns || step.frame.stamp_ns - *other->added_ns > window_ns ||
+        other->class_id != object.class_id || !alike(other->box, object.box, like_size_slack_m())) {
+      continue;
+    }
+    // What was found on the same drive as the object itself is not where it went.
+    if (other->first_seen_ns - object.last_seen_ns <= step.frame.stamp_ns - other->first_seen_ns) continue;
+    const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
+    if (distance > config_.state.relocation_reach_m) continue;
+    if (!best || distance < best_distance) best = other, best_distance = distance;
+  }
+  return best;
 }
 
 LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject& object) {
@@ -329,7 +364,16 @@ LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject
 void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule) {
   LibraryObject& object = *library_.find(id);
   LibraryObject* successor = object.confirmed ? new_place_of(step, object) : nullptr;
-  if (object.confirmed && !successor) {
+  LibraryObject* elsewhere = object.confirmed && !successor ? added_like(step, object) : nullptr;
+  if (elsewhere) {
+    // Seen at its new place before the old one was seen empty.
+    elsewhere->added_ns.reset();
+    step.result.retired.push_back(id);
+    ObjectEvent& event = add_event(step, EventKind::kMoved, *elsewhere, "was_" + std::to_string(to_index(id)));
+    event.previous_box = object.box;
+    event.evidence = step.evidence[id];
+    event.evidence.rule = "was_" + std::to_string(to_index(id));
+  } else if (object.confirmed && !successor) {
     add_event(step, EventKind::kRemoved, object, rule);
     step.result.retired.push_back(id);
     relocations_.remember({id, object.class_id, object.box, object.first_seen_ns, step.frame.stamp_ns});
@@ -379,6 +423,8 @@ void ObjectTracker::remove_or_confirm(Step& step) {
       doubt = doubt || object->moved_from == id ||
               (other->frames_seen_through > 0 && alike(other->box, object->box, like_size_slack_m()));
     }
+    // A removed object seen again from the side grows into its old size within a few frames.
+    doubt = doubt || (object->growing && removed_like(step, *object) != nullptr);
     if (doubt && object->observations < needed + wait) continue;
     confirm(step, *object);
   }

@@ -45,6 +45,10 @@ class ObjectTracker {
   void take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns);
   /// The tentative object in view that is most likely this one, moved; or null.
   LibraryObject* new_place_of(const Step& step, const LibraryObject& object);
+  /// A known object of this class and size that was added since this one was last seen, or null.
+  LibraryObject* added_like(const Step& step, const LibraryObject& object);
+  /// What was removed and looks like this object, or null.
+  const RelocationMemory::Removed* removed_like(const Step& step, const LibraryObject& object);
   void mark_changed(LibraryObject& object);
   void confirm(Step& step, LibraryObject& object);
   void remove(Step& step, ObjectId id, const std::string& rule);

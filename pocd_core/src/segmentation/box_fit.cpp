@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "pocd/common/check.hpp"
 #include "pocd/segmentation/observations.hpp"
@@ -52,8 +53,38 @@ std::vector<cv::Point2f> footprint(const OrientedBox& box, double min_size_m) {
 
 }  // namespace
 
-OrientedBox fit_box(const Points& points_W, double trim) {
+namespace {
+
+/// Heading in (-45, 45] degrees, modulo a quarter turn, to which upright normals agree; nothing when
+/// there are few or they do not agree (round or cluttered things).
+std::optional<double> heading_of_normals(const Points& normals_W) {
+  constexpr float kUpright = 0.5f;    // sine of the largest tilt of a side face
+  constexpr double kAgreement = 0.7;  // mean resultant length of four times the angle
+  double c = 0.0, s = 0.0;
+  std::size_t count = 0;
+  for (const Eigen::Vector3f& n : normals_W) {
+    if (n.squaredNorm() < 0.5f || std::abs(n.z()) > kUpright) continue;
+    const double angle = 4.0 * std::atan2(n.y(), n.x());
+    c += std::cos(angle), s += std::sin(angle);
+    ++count;
+  }
+  if (count < 10 || 5 * count < normals_W.size()) return std::nullopt;
+  if (std::hypot(c, s) < kAgreement * static_cast<double>(count)) return std::nullopt;
+  return std::atan2(s, c) / 4.0;
+}
+
+}  // namespace
+
+OrientedBox fit_box(const Points& points_W, const Points& normals_W, double trim) {
   POCD_CHECK(!points_W.empty());
+  if (const auto heading = heading_of_normals(normals_W)) {
+    OrientedBox box = box_at_heading(points_W, *heading, trim);
+    if (box.size_m.x() < box.size_m.y()) {
+      std::swap(box.size_m.x(), box.size_m.y());
+      box.pose.yaw_rad = wrap_pi(box.pose.yaw_rad + M_PI / 2);
+    }
+    return box;
+  }
   // Relative to the first point, so that float coordinates stay exact far from the origin.
   std::vector<cv::Point2f> flat;
   flat.reserve(points_W.size());

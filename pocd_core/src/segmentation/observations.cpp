@@ -99,19 +99,25 @@ std::vector<Cluster> find_clusters(const OrganizedCloud& cloud, const Segmentati
   return clusters;
 }
 
-/// Up to about `budget` of the cluster's points, evenly by pixel index: enough for its box.
-Points sample_points(const OrganizedCloud& cloud, const std::vector<std::int32_t>& members, int budget) {
-  Points points;
-  const std::size_t step = std::max<std::size_t>(1, members.size() / budget);
-  for (std::size_t k = 0; k < members.size(); k += step) points.push_back(cloud.point_W(members[k]));
-  return points;
+/// Box of about 500 of the cluster's points, evenly by pixel index.
+OrientedBox sample_box(const OrganizedCloud& cloud, const PlaneSegmentation& planes,
+                       const std::vector<std::int32_t>& members) {
+  Points points, normals;
+  const std::size_t step = std::max<std::size_t>(1, members.size() / 500);
+  for (std::size_t k = 0; k < members.size(); k += step) {
+    const std::int32_t i = members[k];
+    points.push_back(cloud.point_W(i));
+    const std::uint16_t plane = planes.plane_of[i];
+    const bool known = plane != PlaneSegmentation::kNoPlane;
+    normals.push_back(known ? planes.planes[plane].normal_W : Eigen::Vector3f::Zero().eval());
+  }
+  return fit_box(points, normals, 0.01);
 }
 
 /// The published rule: overlapping cuboids are one thing seen in pieces. The larger one's class wins.
-void merge_overlapping(const OrganizedCloud& cloud, double min_size_m, std::vector<Cluster>& clusters) {
+void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& planes, double min_size_m, std::vector<Cluster>& clusters) {
   constexpr double kSameClass = 0.3, kOtherClass = 0.8;
-  constexpr int kBoxPoints = 500;
-  for (Cluster& c : clusters) c.box = fit_box(sample_points(cloud, c.members, kBoxPoints), 0.01);
+  for (Cluster& c : clusters) c.box = sample_box(cloud, planes, c.members);
   bool merged = true;
   while (merged) {
     merged = false;
@@ -127,7 +133,7 @@ void merge_overlapping(const OrganizedCloud& cloud, double min_size_m, std::vect
         std::sort(large.members.begin(), large.members.end());
         large.pixels += small.pixels;
         large.area_m2 += small.area_m2;
-        large.box = fit_box(sample_points(cloud, large.members, kBoxPoints), 0.01);
+        large.box = sample_box(cloud, planes, large.members);
         clusters.erase(clusters.begin() + (&small - clusters.data()));
         merged = true;
       }
@@ -195,7 +201,7 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config, c
           cloud.kind[i] != PixelKind::kGround || cloud.label[i] != out.list[owner].class_id) {
         continue;
       }
-      // A face stands upright: going down a row must not come nearer, as the floor does.
+      // The class says whose it is; depth must go on from the row above.
       const float z = cloud.depth_m[i];
       const float limit = 0.5f * tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
       if (std::abs(z - cloud.depth_m[above]) < limit) out.observation_of[i] = owner;
@@ -208,7 +214,7 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config, c
 void extract_observations(const SegmentationConfig& config, const DepthNoise& noise, double spacing_m,
                           const PlaneSegmentation& planes, OrganizedCloud& cloud, Observations& out) {
   std::vector<Cluster> clusters = find_clusters(cloud, config, noise);
-  merge_overlapping(cloud, 2.0 * spacing_m, clusters);
+  merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters);
   out.list.clear();
   out.observation_of.assign(cloud.size(), Observations::kNone);
   for (const Cluster& cluster : clusters) {
@@ -217,10 +223,12 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
     observation.pixels = cluster.pixels;
     observation.area_m2 = cluster.area_m2;
     observation.points = thin(cloud, planes, noise, spacing_m, cluster);
-    Points points;
-    points.reserve(observation.points.size());
-    for (const SurfacePoint& p : observation.points) points.push_back(p.point_W);
-    observation.box = fit_box(points, 0.01);
+    Points points, normals;
+    for (const SurfacePoint& p : observation.points) {
+      points.push_back(p.point_W);
+      normals.push_back(p.normal_W);
+    }
+    observation.box = fit_box(points, normals, 0.01);
     const auto index = static_cast<std::int32_t>(out.list.size());
     for (const std::int32_t i : cluster.members) {
       out.observation_of[i] = index;

@@ -13,6 +13,12 @@ constexpr int kCandidateGoneFrames = 2;
 /// An object that lost more than this share of its points to erosion is gone.
 constexpr double kLeastSurfelShare = 0.15;
 
+/// Longer horizontal side, shorter one, height.
+Eigen::Vector3d sorted_size(const OrientedBox& box) {
+  const double x = box.size_m.x(), y = box.size_m.y();
+  return {std::max(x, y), std::min(x, y), box.size_m.z()};
+}
+
 }  // namespace
 
 Belief next_belief(const Belief& before, double delta_m, int stationarity_class, double k,
@@ -65,33 +71,43 @@ std::optional<std::string> removal_rule(const LibraryObject& object, const State
 }
 
 bool alike(const OrientedBox& a, const OrientedBox& b, double slack_m) {
-  const auto sides = [](const OrientedBox& box) {
-    const double x = box.size_m.x(), y = box.size_m.y();
-    return Eigen::Vector3d(std::max(x, y), std::min(x, y), box.size_m.z());
-  };
-  const Eigen::Vector3d sa = sides(a), sb = sides(b);
+  const Eigen::Vector3d sa = sorted_size(a), sb = sorted_size(b);
   for (int i = 0; i < 3; ++i) {
     if (std::abs(sa[i] - sb[i]) > std::max(slack_m, 0.35 * std::max(sa[i], sb[i]))) return false;
   }
   return true;
 }
 
-std::optional<RelocationMemory::Removed> RelocationMemory::take(ClassId class_id, const OrientedBox& box,
-                                                                StampNs now_ns, double window_s,
-                                                                double slack_m) {
+bool fits_inside(const OrientedBox& part, const OrientedBox& whole, double slack_m) {
+  const Eigen::Vector3d p = sorted_size(part), w = sorted_size(whole);
+  for (int i = 0; i < 3; ++i) {
+    if (p[i] > w[i] + std::max(slack_m, 0.2 * w[i])) return false;
+  }
+  return true;
+}
+
+const RelocationMemory::Removed* RelocationMemory::find(ClassId class_id, const OrientedBox& box,
+                                                        StampNs now_ns, double window_s, double reach_m,
+                                                        double slack_m) {
   const auto window_ns = static_cast<StampNs>(window_s * 1e9);
   while (!removed_.empty() && now_ns - removed_.front().removed_ns > window_ns) removed_.pop_front();
-  auto best = removed_.end();
+  const Removed* best = nullptr;
   double best_distance = 0.0;
-  for (auto it = removed_.begin(); it != removed_.end(); ++it) {
-    if (it->class_id != class_id || !alike(it->box, box, slack_m)) continue;
-    const double distance = (it->box.pose.position_W - box.pose.position_W).norm();
-    if (best == removed_.end() || distance < best_distance) best = it, best_distance = distance;
+  for (const Removed& removed : removed_) {
+    if (removed.class_id != class_id) continue;
+    const double distance = (removed.box.pose.position_W - box.pose.position_W).head<2>().norm();
+    if (!alike(removed.box, box, slack_m) &&
+        !(distance <= reach_m && fits_inside(box, removed.box, slack_m))) {
+      continue;
+    }
+    if (!best || distance < best_distance) best = &removed, best_distance = distance;
   }
-  if (best == removed_.end()) return std::nullopt;
-  const Removed found = *best;
-  removed_.erase(best);
-  return found;
+  return best;
+}
+
+void RelocationMemory::forget(ObjectId id) {
+  removed_.erase(std::remove_if(removed_.begin(), removed_.end(), [&](const Removed& r) { return r.id == id; }),
+                 removed_.end());
 }
 
 }  // namespace pocd

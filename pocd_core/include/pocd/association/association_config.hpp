@@ -14,7 +14,7 @@ struct AssociationConfig {
   double lambda_class = 1000.0;
   double min_visible_share = 0.20;
   int icp_points = 600;
-  int icp_iterations = 12;
+  int icp_iterations = 30;
   double icp_max_distance_m = 0.5;
 
   template <class Visitor>

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -31,8 +32,10 @@ struct LibraryObject {
   int frames_in_view = 0;        ///< tentative only
   int frames_seen_through = 0;   ///< in a row
   OrientedBox reported_box;      ///< as in the last event
+  bool growing = false;          ///< the last observation added a notable share of its points
   std::size_t gained = 0;        ///< points since the last event
   std::size_t lost = 0;          ///< points since the last event
+  std::optional<StampNs> added_ns;  ///< when reported as new; unset for what was known before
   ObjectId moved_from = ObjectId::kNone;  ///< tentative: the object that it may be, elsewhere
   bool changed = false;          ///< since the last FrameResult
   std::size_t box_surfels = 0;   ///< size of the model when the box was fitted

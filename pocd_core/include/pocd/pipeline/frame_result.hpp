@@ -17,6 +17,11 @@ struct ObjectSnapshot {
   int stationarity_class = 0;  ///< s: 0 movable, 1 static
   OrientedBox box;             ///< map frame
   Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();  ///< mean of the mapped surface points [m]
+  /// The 4-DoF pose: x, y and heading of the box, and the mean height of the surface, which does not
+  /// depend on how much of the foot is hidden.
+  Pose4 pose() const {
+    return {{box.pose.position_W.x(), box.pose.position_W.y(), centroid_W.z()}, box.pose.yaw_rad};
+  }
   Belief belief;
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;

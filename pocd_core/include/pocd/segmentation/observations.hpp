@@ -40,10 +40,12 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
                           double spacing_m, const PlaneSegmentation& planes, OrganizedCloud& cloud,
                           Observations& out);
 
-/// Upright box around points: heading of the rectangle of least area around the points flattened to
-/// the ground, the outermost `trim` share of points per axis left out. Sizes of degenerate sets are 0.
-/// At least one point.
-OrientedBox fit_box(const Points& points_W, double trim);
+/// Upright box around points: heading in which most upright surface normals are parallel to a side,
+/// the outermost `trim` share of points per axis left out. Where normals (one per point, zero =
+/// unknown) do not agree, the rectangle of least area around the points flattened to the ground gives
+/// the heading; it alone would not do, since two sides of a box seen from a corner span a triangle,
+/// around which several rectangles are least. Sizes of degenerate sets are 0. At least one point.
+OrientedBox fit_box(const Points& points_W, const Points& normals_W, double trim);
 
 /// The published box: heading of the major axis by principal component analysis.
 OrientedBox fit_box_pca(const Points& points_W);

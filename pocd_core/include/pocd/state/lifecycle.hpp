@@ -32,6 +32,10 @@ std::optional<std::string> removal_rule(const LibraryObject& object, const State
 /// within 35 % or `slack_m`, whichever is more.
 bool alike(const OrientedBox& a, const OrientedBox& b, double slack_m);
 
+/// True when `part` may be a partial view of `whole`: no size of it is larger by more than 20 % or
+/// `slack_m`.
+bool fits_inside(const OrientedBox& part, const OrientedBox& whole, double slack_m);
+
 /// Remembers what was removed, so that a like object that turns up is reported as moved.
 class RelocationMemory {
  public:
@@ -44,10 +48,11 @@ class RelocationMemory {
   };
   void remember(const Removed& removed) { removed_.push_back(removed); }
 
-  /// Takes out and returns the nearest removed object of this class and like size; entries older than
-  /// the window are forgotten.
-  std::optional<Removed> take(ClassId class_id, const OrientedBox& box, StampNs now_ns, double window_s,
-                              double slack_m);
+  /// Nearest removed object of this class that `box` may be, seen whole (alike) or in part: then it must
+  /// lie within `reach_m`. Entries older than the window are forgotten. Valid until the next call.
+  const Removed* find(ClassId class_id, const OrientedBox& box, StampNs now_ns, double window_s,
+                      double reach_m, double slack_m);
+  void forget(ObjectId id);
 
  private:
   std::deque<Removed> removed_;

@@ -17,9 +17,10 @@ struct StateConfig {
   int confirm_observations = 3;
   int tentative_frames = 15;
   int erode_frames = 5;
-  int wait_for_doubt_frames = 12;
+  int wait_for_doubt_frames = 6;
   int merge_frames = 10;
   double relocation_window_s = 60.0;
+  double relocation_reach_m = 2.5;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -50,6 +51,8 @@ struct StateConfig {
           "Objects of one class that share an observation in this many frames are one [frames].");
     visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
           "A removed object and a new one of like class and size within this time are one MOVED [s].");
+    visit("relocation_reach_m", relocation_reach_m, Range{0.0, 1e6},
+          "A new object that is seen only in part is the removed one within this distance [m].");
   }
 };
 
