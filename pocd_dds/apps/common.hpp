@@ -1,0 +1,58 @@
+// What the commands on the bus have in common: signals, logging, bus options.
+#pragma once
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <exception>
+#include <iostream>
+#include <string>
+
+#include "pocd/common/check.hpp"
+#include "pocd_dds/entities/participant.hpp"
+
+namespace pocd::dds {
+
+inline std::atomic<bool> stop_requested{false};
+
+/// The first SIGINT or SIGTERM asks for an orderly end, a second one ends the process as usual.
+inline void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = true; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+/// Messages go to stderr; stdout belongs to results.
+inline void log_to_stderr(const std::string& program) {
+  auto logger = spdlog::stderr_color_mt(program);
+  logger->set_pattern("[%H:%M:%S.%e] %n: %^%l%$: %v");
+  spdlog::set_default_logger(logger);
+}
+
+/// Adds --domain and --profiles.
+inline void add_bus_options(CLI::App& app, int& domain, std::string& profiles_file) {
+  app.add_option("--domain", domain, "DDS domain; default: ROS_DOMAIN_ID, or 0")
+      ->check(CLI::Range(0, 232));
+  app.add_option("--profiles", profiles_file,
+                 "Fast DDS XML profiles: a default participant profile, or profiles named like a "
+                 "topic, replace the built-in settings")
+      ->check(CLI::ExistingFile);
+}
+
+/// Runs `body`; an exception becomes one line on stderr and exit code 1.
+template <class Body>
+int guarded(const char* program, Body body) {
+  try {
+    return body();
+  } catch (const std::exception& error) {
+    std::cerr << program << ": " << error.what() << '\n';
+    return 1;
+  }
+}
+
+}  // namespace pocd::dds

@@ -1,0 +1,137 @@
+// Follows the published map into a copy and writes it to files.
+#include <cstdio>
+#include <filesystem>
+
+#include "apps/common.hpp"
+#include "pocd/map/birdseye.hpp"
+#include "pocd/map/mesh.hpp"
+#include "pocd/output/result_csv.hpp"
+#include "pocd_dds/map_mirror.hpp"
+
+namespace {
+
+struct Options {
+  pocd::MirrorOptions mirror;
+  std::filesystem::path output;
+  bool until_end = false;
+  bool until_in_step = false;
+  std::optional<std::uint64_t> expect_version;
+  std::optional<double> timeout_s;
+};
+
+std::string describe(const pocd::MirrorStatus& status) {
+  return status.in_step ? "in step with publisher" : "stale, because " + status.stale_because;
+}
+
+void print(const pocd::MirrorStatus& status) {
+  std::printf("%s: epoch %016llx version %llu digest %s, %zu tiles, %zu objects\n",
+              describe(status).c_str(), static_cast<unsigned long long>(status.epoch),
+              static_cast<unsigned long long>(status.version), status.digest.hex().c_str(),
+              status.tiles, status.objects);
+  std::fflush(stdout);
+}
+
+/// The publisher has ended its run, or is not there any more.
+bool ended(const pocd::MirrorStatus& status) {
+  return status.final_version || (status.publisher_seen && !status.publisher_present);
+}
+
+bool reached(const Options& options, const pocd::MirrorStatus& status) {
+  if (options.until_end && ended(status)) return true;
+  if (options.expect_version && status.in_step && status.version >= *options.expect_version) {
+    return true;
+  }
+  return options.until_in_step && status.in_step && status.version > 0;
+}
+
+void write_files(const pocd::MirrorContents& contents, const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  const pocd::Mesh mesh =
+      pocd::extract_mesh(contents.tiles, contents.voxel_size_m, contents.truncation_m);
+  pocd::write_ply(mesh, pocd::appearance_by_stationarity(contents.objects), folder / "map.ply");
+  if (!mesh.vertices_W.empty()) {
+    pocd::write_birdseye(mesh, contents.objects, folder / "birdseye.png");
+  }
+  pocd::write_objects_csv(
+      contents.objects, [&](pocd::ClassId id) { return contents.class_names.at(id); },
+      folder / "objects.csv");
+}
+
+int follow(Options options) {
+  using std::chrono::milliseconds;
+  std::optional<pocd::EventsCsv> events;
+  if (!options.output.empty()) {
+    std::filesystem::create_directories(options.output);
+    events.emplace(options.output / "events.csv");
+    options.mirror.on_event = [&events](const pocd::ObjectEvent& event, const std::string& name) {
+      events->add(event, name);
+    };
+  }
+  auto mirror = std::make_unique<pocd::MapMirror>(options.mirror);
+  const auto start = std::chrono::steady_clock::now();
+  const auto over = [&] {
+    return options.timeout_s &&
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >
+               *options.timeout_s;
+  };
+  const auto arrived = [&](const pocd::MirrorStatus& status) { return reached(options, status); };
+  std::string last;
+  bool done = false;
+  while (!done && !pocd::dds::stop_requested && !over()) {
+    done = mirror->wait_until(arrived, milliseconds(200));
+    const pocd::MirrorStatus status = mirror->status();
+    const std::string text = describe(status);
+    if (text != last) spdlog::info("{} (version {})", text, status.version);
+    last = text;
+  }
+  const pocd::MirrorContents contents = mirror->contents();
+  mirror.reset();  // no event comes after this
+  if (events) events->close();
+  print(contents.status);
+  if (!options.output.empty() && contents.status.epoch != 0) {
+    write_files(contents, options.output);
+  }
+  if (over() && !done) {
+    spdlog::error("gave up after {} s", *options.timeout_s);
+    return 1;
+  }
+  return contents.status.in_step ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Keeps a copy of the published map and says whether it is the publisher's.\n"
+      "Example: pocd_mirror --until-end --output output/mirror\n"
+      "Exit code: 0 in step with the publisher at the end, 1 stale, 2 usage.",
+      "pocd_mirror");
+  Options options;
+  app.set_version_flag("--version", POCD_VERSION);
+  app.add_option("--output", options.output,
+                 "Folder for events.csv, and at the end map.ply, birdseye.png and objects.csv");
+  app.add_flag("--until-end", options.until_end,
+               "End when the publisher has ended its run or has gone");
+  app.add_flag("--until-in-step", options.until_in_step,
+               "End as soon as the copy equals a map that is not empty");
+  app.add_option("--expect-version", options.expect_version,
+                 "End when the copy equals this version of the map or a later one");
+  app.add_option("--timeout", options.timeout_s, "Give up after that many seconds")
+      ->check(CLI::PositiveNumber);
+  int domain = -1;
+  pocd::dds::add_bus_options(app, domain, options.mirror.profiles_file);
+  try {
+    app.parse(argc, argv);
+    options.mirror.domain = domain >= 0 ? domain : pocd::dds::default_domain();
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const pocd::InputError& error) {
+    std::cerr << "pocd_mirror: " << error.what() << '\n';
+    return 2;
+  }
+  return pocd::dds::guarded("pocd_mirror", [&] {
+    pocd::dds::log_to_stderr("pocd_mirror");
+    pocd::dds::stop_on_signals();
+    return follow(options);
+  });
+}

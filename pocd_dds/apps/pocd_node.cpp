@@ -1,0 +1,93 @@
+// The component: camera, segmentation and odometry topics in, objects and map deltas out.
+#include <random>
+
+#include "apps/common.hpp"
+#include "pocd/config/config_io.hpp"
+#include "pocd_dds/node/node.hpp"
+
+namespace {
+
+std::uint64_t random_epoch() {
+  std::random_device device;
+  const std::uint64_t epoch = std::uint64_t{device()} << 32 | device();
+  return epoch == 0 ? 1 : epoch;
+}
+
+/// Robots named on the command line take the place of those of the files.
+void set_robots(const std::vector<std::string>& names, pocd::dds::NodeConfig& node) {
+  if (names.empty()) return;
+  node.robots.clear();
+  for (const std::string& name : names) {
+    pocd::dds::RobotConfig robot;
+    robot.name = name;
+    node.robots.push_back(robot);
+  }
+  const std::vector<std::string> problems = node.inconsistencies();
+  if (!problems.empty()) throw pocd::InputError("--robot: " + problems.front());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Maps what the robots' cameras see and publishes what changes.\n"
+      "Example: pocd_node --config config/simulated.yaml --robot robot_1 --robot robot_2\n"
+      "Runs until SIGINT or SIGTERM, then publishes its last state.\n"
+      "Exit code: 0 ended in order, 1 the bus failed or subscribers did not acknowledge the last "
+      "state, 2 usage or configuration.",
+      "pocd_node");
+  pocd::dds::NodeOptions options;
+  options.bus.name = "pocd_node";
+  std::vector<std::filesystem::path> files;
+  std::vector<std::string> overrides, robots;
+  std::optional<std::uint64_t> epoch;
+  bool dump = false;
+  app.set_version_flag("--version", POCD_VERSION);
+  app.add_option("--config", files, "Configuration file; repeat it to overlay several")
+      ->allow_extra_args(false);
+  app.add_option("--set", overrides, "Override one parameter: GROUP.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--robot", robots, "A robot's name, {robot} in the topics; repeat it for several")
+      ->allow_extra_args(false);
+  app.add_flag_callback(
+      "--lossless", [&] { overrides.push_back("node.lossless=true"); },
+      "Hold the player back instead of dropping frames (replays)");
+  app.add_option("--epoch", epoch, "Name of this run; default: random. Never use one twice")
+      ->check(CLI::Range(std::uint64_t{1}, ~std::uint64_t{0}));
+  app.add_flag("--dump", dump, "Print the effective configuration and end");
+  int domain = -1;
+  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    pocd::load_config(options.config, files, overrides);
+    set_robots(robots, options.config.node);
+    if (dump) {
+      std::cout << pocd::dump_config(options.config);
+      return std::cout.flush() ? 0 : 1;
+    }
+    if (options.config.node.robots.empty()) {
+      throw pocd::InputError("no robot: give --robot NAME or node.robots in the configuration");
+    }
+    options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
+  } catch (const pocd::InputError& error) {
+    std::cerr << "pocd_node: " << error.what() << '\n';
+    return 2;
+  }
+  return pocd::dds::guarded("pocd_node", [&] {
+    pocd::dds::log_to_stderr("pocd_node");
+    pocd::dds::stop_on_signals();
+    options.epoch = epoch ? *epoch : random_epoch();
+    pocd::dds::Node node(options);
+    spdlog::info("running on domain {}, epoch {:016x}, {} robot(s)", options.bus.domain,
+                 options.epoch, options.config.node.robots.size());
+    const bool good = node.run(pocd::dds::stop_requested);
+    const pocd::dds::WorkStatus work = node.work_status();
+    spdlog::info("ended: {} frames processed, {} refused, {} objects, map version {}",
+                 work.processed, work.refused, work.objects, work.map_version);
+    return good ? 0 : 1;
+  });
+}
