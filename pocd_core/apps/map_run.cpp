@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
-#include <map>
 #include <ostream>
 
 #include "pocd/common/check.hpp"
@@ -74,7 +73,7 @@ void count(const std::vector<ObjectEvent>& events, RunSummary& summary) {
 void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary,
                  std::ostream& log) {
   const std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
-  EventsCsv events(options.output / "events.csv", options.config.classes);
+  EventsCsv events(options.output / "events.csv");
   TimingCsv timing(options.output / "timing.csv");
   Progress progress(options.show_progress, reader->size());
   std::size_t reported = 0;
@@ -111,7 +110,9 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
     for (const std::string& warning : result.warnings) {
       report("frame " + std::to_string(frame->sequence) + ": " + warning);
     }
-    for (const ObjectEvent& event : result.events) events.add(event);
+    for (const ObjectEvent& event : result.events) {
+      events.add(event, options.config.classes.name(event.class_id));
+    }
     count(result.events, summary);
     result.timings.insert(result.timings.begin(), {"read", read_ms});
     timing.add(*frame, result.timings);
@@ -119,19 +120,6 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
   }
   events.close();
   timing.close();
-}
-
-/// Objects in the colours of the bird's-eye picture, everything else in the grey of the default.
-AppearanceOf appearance_of(const std::vector<ObjectSnapshot>& objects) {
-  std::map<std::uint32_t, OwnerAppearance> known;
-  for (const ObjectSnapshot& object : objects) {
-    const auto bgr = stationarity_color(object.belief.stationarity());
-    known[to_index(object.id)] = {{bgr[2], bgr[1], bgr[0]}, object.class_id};
-  }
-  return [known](std::uint32_t owner) {
-    const auto it = known.find(owner);
-    return it == known.end() ? OwnerAppearance{} : it->second;
-  };
 }
 
 void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary) {
@@ -143,8 +131,10 @@ void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary&
                                  options.config.map.truncation_m());
   const std::vector<ObjectSnapshot> objects = pipeline.objects();
   summary.objects = objects.size();
-  write_objects_csv(objects, options.config.classes, options.output / "objects.csv");
-  write_ply(mesh, appearance_of(objects), options.output / "map.ply");
+  const ClassMap& classes = options.config.classes;
+  write_objects_csv(objects, [&](ClassId id) { return classes.name(id); },
+                    options.output / "objects.csv");
+  write_ply(mesh, appearance_by_stationarity(objects), options.output / "map.ply");
   write_birdseye(mesh, objects, options.output / "birdseye.png");
 }
 

@@ -84,6 +84,7 @@ pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, std::ui
 ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message);
 pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, std::uint64_t epoch,
                                           const ClassMap& classes, const std::string& frame_id);
+ObjectEvent event_from(const pocd_msgs::msg::ObjectEvent& message);
 
 pocd_msgs::msg::MapTile tile_message(const MapTile& tile, std::uint32_t map_id,
                                      std::uint64_t epoch);

@@ -49,6 +49,18 @@ pocd_msgs::msg::Belief belief_of(const Belief& belief) {
   return message;
 }
 
+OrientedBox box_from(const pocd_msgs::msg::OrientedBox& message) {
+  OrientedBox box;
+  box.pose.position_W = {message.position().x(), message.position().y(), message.position().z()};
+  box.pose.yaw_rad = message.yaw();
+  box.size_m = {message.size().x(), message.size().y(), message.size().z()};
+  return box;
+}
+
+Belief belief_from(const pocd_msgs::msg::Belief& message) {
+  return Belief{message.mu(), message.sigma(), message.alpha(), message.beta()};
+}
+
 pocd_msgs::msg::TileKey key_of(const TileKey& key) {
   pocd_msgs::msg::TileKey message;
   message.x(key.x), message.y(key.y), message.z(key.z);
@@ -181,12 +193,8 @@ ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message) {
   object.id = static_cast<ObjectId>(message.local_id());
   object.class_id = message.class_id();
   object.stationarity_class = message.stationarity_class();
-  const auto& box = message.box();
-  object.box.pose.position_W = {box.position().x(), box.position().y(), box.position().z()};
-  object.box.pose.yaw_rad = box.yaw();
-  object.box.size_m = {box.size().x(), box.size().y(), box.size().z()};
-  const auto& belief = message.belief();
-  object.belief = Belief{belief.mu(), belief.sigma(), belief.alpha(), belief.beta()};
+  object.box = box_from(message.box());
+  object.belief = belief_from(message.belief());
   object.first_seen_ns = to_stamp(message.first_seen());
   object.last_seen_ns = to_stamp(message.last_seen());
   object.observations = message.observations();
@@ -224,6 +232,32 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, std::uint64_
   evidence.rule(event.evidence.rule);
   message.evidence(evidence);
   return message;
+}
+
+ObjectEvent event_from(const pocd_msgs::msg::ObjectEvent& message) {
+  ObjectEvent event;
+  event.sequence = message.seq();
+  event.kind = static_cast<EventKind>(message.kind());
+  event.object = static_cast<ObjectId>(message.local_id());
+  event.class_id = message.class_id();
+  event.stamp_ns = to_stamp(message.header().stamp());
+  event.frame_sequence = message.frame_sequence();
+  event.robot = message.robot();
+  event.box = box_from(message.box());
+  if (message.has_previous_box()) event.previous_box = box_from(message.previous_box());
+  const auto& evidence = message.evidence();
+  event.evidence.delta_m = evidence.delta();
+  event.evidence.stationarity_class = evidence.stationarity_class();
+  event.evidence.k = evidence.k();
+  event.evidence.c1 = evidence.c1();
+  event.evidence.c2 = evidence.c2();
+  event.evidence.visible_share = evidence.visible_share();
+  event.evidence.seen_through_share = evidence.seen_through_share();
+  event.evidence.measurement_sigma_m = evidence.measurement_sigma();
+  event.evidence.before = belief_from(evidence.before());
+  event.evidence.after = belief_from(evidence.after());
+  event.evidence.rule = evidence.rule();
+  return event;
 }
 
 pocd_msgs::msg::MapTile tile_message(const MapTile& tile, std::uint32_t map_id,

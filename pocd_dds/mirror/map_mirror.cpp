@@ -47,6 +47,7 @@ struct MapMirror::Impl {
         deltas(participant, dds::topics::kMapDeltas, wakeup),
         replies(participant, dds::topics::kSnapshotReply, wakeup),
         object_states(participant, dds::topics::kObjects, wakeup),
+        events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
         thread([this] { run(); }) {}
 
@@ -58,6 +59,7 @@ struct MapMirror::Impl {
 
   void run();
   void take_objects();
+  void take_events();
   void take_manifests();
   void take_deltas();
   void take_replies();
@@ -73,6 +75,7 @@ struct MapMirror::Impl {
   dds::Reader<msg::MapDeltaPubSubType> deltas;
   dds::Reader<msg::MapSnapshotReplyPubSubType> replies;
   dds::Reader<msg::ObjectStatePubSubType> object_states;
+  dds::Reader<msg::ObjectEventPubSubType> events;
   dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
 
   // Guards everything up to the thread.
@@ -95,6 +98,7 @@ struct MapMirror::Impl {
 void MapMirror::Impl::run() {
   while (!stopping) {
     wakeup.wait_for(kIdle);
+    take_events();
     {
       const std::lock_guard<std::mutex> lock(mutex);
       take_objects();
@@ -116,6 +120,16 @@ void MapMirror::Impl::take_objects() {
       objects[state.uuid()] = state;
     } else if (meta.disposed) {
       objects.erase(meta.key);
+    }
+  }
+}
+
+void MapMirror::Impl::take_events() {
+  msg::ObjectEvent message;
+  dds::SampleMeta meta;
+  while (events.take(message, meta)) {
+    if (meta.valid && options.on_event) {
+      options.on_event(dds::event_from(message), message.class_name());
     }
   }
 }
@@ -277,6 +291,7 @@ MirrorContents MapMirror::contents() const {
   for (const auto& [key, state] : impl_->objects) {
     if (impl_->manifest && state.epoch() != impl_->manifest->epoch()) continue;
     contents.objects.push_back(dds::object_from(state));
+    contents.class_names[state.class_id()] = state.class_name();
   }
   return contents;
 }

@@ -19,6 +19,9 @@ struct MirrorOptions {
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd_mirror";
   std::uint32_t map_id = 0;
+  /// Called for every event in order, by the mirror's thread, with the name of the object's class.
+  /// Events from before the mirror joined are not repeated.
+  std::function<void(const ObjectEvent&, const std::string& class_name)> on_event;
 };
 
 struct MirrorStatus {
@@ -43,6 +46,7 @@ struct MirrorContents {
   std::string frame_id;
   std::map<TileKey, MapTile> tiles;
   std::vector<ObjectSnapshot> objects;  ///< by id
+  std::map<ClassId, std::string> class_names;  ///< of the objects
 };
 
 /// Follows the deltas with a thread of its own, from construction on. When it joins late or has missed

@@ -8,14 +8,6 @@
 namespace pocd {
 namespace {
 
-ClassMap one_class(const std::string& name) {
-  ClassMap classes;
-  classes.list.resize(1);
-  classes.list[0].id = 7;
-  classes.list[0].name = name;
-  return classes;
-}
-
 ObjectEvent moved_event() {
   ObjectEvent event;
   event.sequence = 3;
@@ -33,12 +25,12 @@ ObjectEvent moved_event() {
 TEST(ResultCsv, EventsReadBack) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "events.csv";
-  EventsCsv csv(file, one_class("box, \"large\""));
-  csv.add(moved_event());
+  EventsCsv csv(file);
+  csv.add(moved_event(), "box, \"large\"");
   ObjectEvent removed = moved_event();
   removed.kind = EventKind::kRemoved;
   removed.previous_box.reset();
-  csv.add(removed);
+  csv.add(removed, "box");
   csv.close();
 
   const std::vector<ReportedEvent> events = read_events_csv(file);
@@ -61,7 +53,7 @@ TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
   object.class_id = 7;
   object.box.size_m = {1.0, 0.5, 2.0};
   object.last_robot = "robot1";
-  write_objects_csv({object}, one_class("box"), file);
+  write_objects_csv({object}, [](ClassId) { return "box"; }, file);
   const std::string text = read_text(file);
   const std::string row = text.substr(text.find('\n') + 1);
   EXPECT_EQ(row,

@@ -34,4 +34,7 @@ void write_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects
 /// BGR colour of a stationarity score in [0, 1]; values outside are clamped.
 std::array<std::uint8_t, 3> stationarity_color(double score);
 
+/// For write_ply: objects in the colour of their E[v], with their class; everything else grey.
+AppearanceOf appearance_by_stationarity(const std::vector<ObjectSnapshot>& objects);
+
 }  // namespace pocd

@@ -4,14 +4,17 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "pocd/input/frame.hpp"
 #include "pocd/pipeline/frame_result.hpp"
-#include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
+
+/// Name of a class in outputs.
+using ClassNameOf = std::function<std::string(ClassId)>;
 
 /// A CSV file being written. Throws InputError naming the file when it cannot be opened or written.
 class CsvFile {
@@ -28,19 +31,18 @@ class CsvFile {
 };
 
 /// id, class, class name, s, box, belief, times: one line per object in the given order.
-void write_objects_csv(const std::vector<ObjectSnapshot>& objects, const ClassMap& classes,
+void write_objects_csv(const std::vector<ObjectSnapshot>& objects, const ClassNameOf& class_name,
                        const std::filesystem::path& file);
 
 /// One line per event with the evidence that caused it.
 class EventsCsv {
  public:
-  EventsCsv(const std::filesystem::path& file, const ClassMap& classes);
-  void add(const ObjectEvent& event);
+  explicit EventsCsv(const std::filesystem::path& file);
+  void add(const ObjectEvent& event, const std::string& class_name);
   void close() { file_.close(); }
 
  private:
   CsvFile file_;
-  ClassMap classes_;
 };
 
 /// One line per frame and stage.
