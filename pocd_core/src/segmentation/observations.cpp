@@ -38,15 +38,14 @@ struct Cluster {
   OrientedBox box;
 };
 
-bool connected(const OrganizedCloud& cloud, std::size_t a, std::size_t b, float tolerance_m,
-               float pixel_angle, const DepthNoise& noise) {
+/// Whether object pixel b belongs with object pixel a, whose largest distance to neighbours is given.
+bool connected(const OrganizedCloud& cloud, std::int32_t a, std::int32_t b, float limit_m) {
   if (cloud.kind[b] != PixelKind::kObject || cloud.label[a] != cloud.label[b] ||
       cloud.instance[a] != cloud.instance[b]) {
     return false;
   }
-  const float z = std::max(cloud.depth_m[a], cloud.depth_m[b]);
-  const float limit = tolerance_m + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
-  return (cloud.point_W(a) - cloud.point_W(b)).squaredNorm() < limit * limit;
+  const float dx = cloud.x_W[a] - cloud.x_W[b], dy = cloud.y_W[a] - cloud.y_W[b], dz = cloud.z_W[a] - cloud.z_W[b];
+  return dx * dx + dy * dy + dz * dz < limit_m * limit_m;
 }
 
 /// Connected components of object pixels, in the order of their first pixel.
@@ -60,12 +59,12 @@ std::vector<Cluster> find_clusters(const OrganizedCloud& cloud, const Segmentati
     for (int col = 0; col < width; ++col) {
       const std::int32_t i = row * width + col;
       if (cloud.kind[i] != PixelKind::kObject) continue;
+      const float z = cloud.depth_m[i];
+      const float limit = tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
       const auto try_join = [&](std::int32_t j) {
-        if (connected(cloud, i, j, tolerance, pixel_angle, noise)) {
-          sets.join(i, j);
-          return true;
-        }
-        return false;
+        const bool joined = connected(cloud, i, j, limit);
+        if (joined) sets.join(i, j);
+        return joined;
       };
       if (col + 1 < width && !try_join(i + 1) && col + 2 < width) try_join(i + 2);
       if (row + 1 < height && !try_join(i + width) && row + 2 < height) try_join(i + 2 * width);
@@ -130,7 +129,6 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
         if (!same && small.pixels * 4 > large.pixels) continue;
         if (box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass)) continue;
         large.members.insert(large.members.end(), small.members.begin(), small.members.end());
-        std::sort(large.members.begin(), large.members.end());
         large.pixels += small.pixels;
         large.area_m2 += small.area_m2;
         large.box = sample_box(cloud, planes, large.members);
