@@ -7,6 +7,7 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
+#include "pocd/input/pose_quaternion.hpp"
 #include "pocd/map/birdseye.hpp"
 #include "pocd/map/map_delta.hpp"
 #include "pocd/map/mesh.hpp"
@@ -89,7 +90,11 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
       break;
     }
     const auto read_start = std::chrono::steady_clock::now();
-    const std::optional<Frame> frame = reader->next();
+    std::optional<Frame> frame = reader->next();
+    // The pose that a node would get, in every bit; a recording's frames have made that way already.
+    if (frame && options.dataset.format != "mcap") {
+      frame->T_W_C = through_messages(frame->T_W_C, reader->extrinsics().T_B_C);
+    }
     const double read_ms = 1e3 * seconds_since(read_start);
     for (; reported < reader->problems().size(); ++reported) {
       report("skipped: " + reader->problems()[reported]);
