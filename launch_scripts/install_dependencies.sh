@@ -11,7 +11,7 @@ packages=(
   fastddsgen default-jre-headless fastdds-tools libfastrtps-dev libfastcdr-dev
   # core
   libeigen3-dev libpcl-dev libopencv-dev libyaml-cpp-dev libspdlog-dev libcli11-dev libdlib-dev
-  libzstd-dev libxxhash-dev libnanoflann-dev
+  libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev iproute2 iptables
 )
