@@ -220,6 +220,37 @@ SchemaText IdlLibrary::ros2msg(const std::string& scoped_name) const {
   return schema;
 }
 
+std::optional<std::array<std::uint8_t, 16>> IdlLibrary::key_of(const std::string& scoped_name,
+                                                               const std::uint8_t* payload,
+                                                               std::size_t size) const {
+  static const std::map<std::string, std::size_t> sizes{
+      {"bool", 1},   {"uint8", 1}, {"int8", 1},   {"char", 1},  {"int16", 2},
+      {"uint16", 2}, {"int32", 4}, {"uint32", 4}, {"int64", 8}, {"uint64", 8}};
+  const std::vector<Field>& fields = fields_of(scoped_name);
+  constexpr std::size_t kHeader = 4;
+  if (size < kHeader || payload[0] != 0 || payload[1] > 1) return std::nullopt;
+  const bool little = payload[1] == 1;
+  std::array<std::uint8_t, 16> key{};
+  std::size_t at = 0;
+  bool keys_over = false;
+  for (const Field& field : fields) {
+    keys_over = keys_over || !field.key;
+    if (!field.key) continue;
+    const auto element = sizes.find(field.type);
+    if (keys_over || element == sizes.end() || field.suffix == "[]") return std::nullopt;
+    const std::size_t n = element->second;
+    std::size_t count = field.suffix.empty() ? 1 : std::stoul(field.suffix.substr(1));
+    for (at = (at + n - 1) / n * n; count > 0; --count, at += n) {
+      if (at + n > key.size() || kHeader + at + n > size) return std::nullopt;
+      for (std::size_t i = 0; i < n; ++i) {
+        key[at + i] = payload[kHeader + at + (little ? n - 1 - i : i)];
+      }
+    }
+  }
+  if (at == 0) return std::nullopt;
+  return key;
+}
+
 SchemaText IdlLibrary::omgidl(const std::string& scoped_name) const {
   std::vector<std::string> names;
   needed_by(scoped_name, names);

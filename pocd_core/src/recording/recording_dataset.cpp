@@ -111,7 +111,7 @@ class RecordingDataset : public DatasetReader {
   }
 
   Feed feed_of(const RecordedChannel& channel) const {
-    if (channel.message_encoding != "cdr" || is_dispose_channel(channel)) return {};
+    if (channel.message_encoding != "cdr" || is_instance_channel(channel)) return {};
     const auto known = [&](const std::string& pattern) -> std::optional<std::string> {
       const auto robot = robot_in(pattern, channel.topic);
       return robot && robots_.count(*robot) ? robot : std::nullopt;
@@ -134,8 +134,8 @@ class RecordingDataset : public DatasetReader {
     return {};
   }
 
-  static bool is_dispose_channel(const RecordedChannel& channel) {
-    return channel.metadata.count("disposes") > 0;
+  static bool is_instance_channel(const RecordedChannel& channel) {
+    return channel.metadata.count("instances_of") > 0;
   }
 
   /// False when there is no other file.

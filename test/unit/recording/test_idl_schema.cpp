@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "pocd/common/check.hpp"
+#include "pocd/recording/cdr.hpp"
 
 namespace pocd::recording {
 namespace {
@@ -58,6 +59,27 @@ TEST(IdlSchema, ReadsTheProjectsOwnFiles) {
                 "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n");
   EXPECT_TRUE(library.has("pocd_msgs::msg::FrameRecord"));
   EXPECT_THROW(library.ros2msg("no::such::Type"), InputError);
+}
+
+TEST(IdlSchema, KeysAreTheHandlesOnTheBus) {
+  const IdlLibrary library(
+      Files{{"k.idl",
+             "module k { struct Tile { @key unsigned long map; @key long x; @key short y;"
+             " @key octet z; double v; }; struct None { long a; }; struct Late { long a;"
+             " @key long b; }; struct Long { @key octet id[17]; }; };"}});
+  CdrWriter out;
+  out.number(std::uint32_t{0x01020304});
+  out.number(std::int32_t{-2});
+  out.number(std::int16_t{0x0506});
+  out.number(std::uint8_t{7});
+  const Bytes& p = out.bytes();
+  const std::array<std::uint8_t, 16> expected{1, 2, 3, 4, 255, 255, 255, 254, 5, 6, 7};
+  EXPECT_EQ(library.key_of("k::Tile", p.data(), p.size()), expected);
+  EXPECT_FALSE(library.key_of("k::Tile", p.data(), p.size() - 1));
+  EXPECT_FALSE(library.key_of("k::None", p.data(), p.size()));
+  EXPECT_FALSE(library.key_of("k::Late", p.data(), p.size()));
+  const Bytes longer(30, 0);
+  EXPECT_FALSE(library.key_of("k::Long", longer.data(), longer.size()));
 }
 
 TEST(IdlSchema, NamesFileAndLineOfWhatItDoesNotKnow) {

@@ -1,7 +1,11 @@
 // Schema texts for recordings, made of the IDL that the types are generated from.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +31,13 @@ class IdlLibrary {
   /// ROS message definition of "sensor_msgs::msg::Image": its fields, and after lines of 80 "="
   /// those of every type it needs. Throws InputError when it is not there.
   SchemaText ros2msg(const std::string& scoped_name) const;
+  /// Instance that a CDR payload of a keyed type belongs to, as its handle on the bus: the key
+  /// fields in big endian CDR, filled up with zeros. Nothing when the type's keys are not its first
+  /// fields, are not numbers, take more than 16 bytes, or the payload is too short.
+  std::optional<std::array<std::uint8_t, 16>> key_of(const std::string& scoped_name,
+                                                     const std::uint8_t* payload,
+                                                     std::size_t size) const;
+
   /// IDL of the type and all that it needs, each once, without preprocessor lines.
   SchemaText omgidl(const std::string& scoped_name) const;
 
