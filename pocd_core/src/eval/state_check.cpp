@@ -39,18 +39,17 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
   std::vector<AssignmentCandidate> pairs;
   for (std::size_t e = 0; e < expected.objects.size(); ++e) {
     for (std::size_t o = 0; o < objects.size(); ++o) {
-      const Eigen::Vector3d& center_W = objects[o].box.pose.position_W;
-      const double cost = std::min(nearest_listed_m(expected.objects[e], center_W),
-                                   box_distance_m(expected.objects[e], center_W));
+      const double cost = std::min(nearest_listed_m(expected.objects[e], objects[o].centroid_W),
+                                   box_distance_m(expected.objects[e], objects[o].box.pose.position_W));
       if (cost < kPairing_m) pairs.push_back({static_cast<int>(e), static_cast<int>(o), cost});
     }
   }
   std::vector<bool> expected_used(expected.objects.size()), object_used(objects.size());
   for (const AssignedPair& pair : assign(pairs, kPairing_m)) {
     const auto e = static_cast<std::size_t>(pair.row), o = static_cast<std::size_t>(pair.column);
-    const Eigen::Vector3d& center_W = objects[o].box.pose.position_W;
-    verdict.matches.push_back({e, objects[o].id, nearest_listed_m(expected.objects[e], center_W),
-                               box_distance_m(expected.objects[e], center_W)});
+    verdict.matches.push_back({e, objects[o].id,
+                               nearest_listed_m(expected.objects[e], objects[o].centroid_W),
+                               box_distance_m(expected.objects[e], objects[o].box.pose.position_W)});
     expected_used[e] = object_used[o] = true;
   }
   for (std::size_t e = 0; e < expected.objects.size(); ++e) {
@@ -58,9 +57,9 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
   }
   for (std::size_t o = 0; o < objects.size(); ++o) {
     if (object_used[o]) continue;
-    const Eigen::Vector3d& center_W = objects[o].box.pose.position_W;
     const bool hidden = std::any_of(expected.hidden.begin(), expected.hidden.end(), [&](const auto& h) {
-      return std::min(nearest_listed_m(h, center_W), box_distance_m(h, center_W)) <= tolerance_m;
+      return std::min(nearest_listed_m(h, objects[o].centroid_W),
+                      box_distance_m(h, objects[o].box.pose.position_W)) <= tolerance_m;
     });
     (hidden ? verdict.kept_hidden : verdict.extra).push_back(objects[o].id);
   }

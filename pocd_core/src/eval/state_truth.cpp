@@ -87,7 +87,7 @@ ExpectedState list_state(int state, const StateTruth& truth, const Frame& frame,
       ExpectedObject object;
       object.listed_W = thing.center_W();
       object.points_W = instance.points_W;
-      object.box = fit_box(instance.points_W, 0.005);
+      object.box = fit_box(instance.points_W, {}, 0.005);
       expected.objects.push_back(std::move(object));
       ids.push_back(id);
       break;

@@ -16,6 +16,7 @@ ObjectSnapshot held(std::uint32_t id, double x, double y, double z) {
   ObjectSnapshot object;
   object.id = ObjectId{id};
   object.box.pose.position_W = {x, y, z};
+  object.centroid_W = {x, y, z};
   return object;
 }
 

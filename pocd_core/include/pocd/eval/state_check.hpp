@@ -13,8 +13,8 @@ namespace pocd {
 struct StateMatch {
   std::size_t expected = 0;  ///< in ExpectedState::objects
   ObjectId object = ObjectId::kNone;
-  double listed_m = 0.0;  ///< distance of centres, nearest of the thing's listed ones
-  double box_m = 0.0;     ///< distance to the centre of the box around the thing's labelled points
+  double listed_m = 0.0;  ///< of the surface centroid to the nearest of the listed centres
+  double box_m = 0.0;     ///< of the box centre to that of the box around the labelled points
 };
 
 struct StateVerdict {
@@ -25,8 +25,8 @@ struct StateVerdict {
   std::vector<ObjectId> extra;
   /// Exactly the things that are there, centres within the tolerance of the listed ones.
   bool ok_listed = false;
-  /// The same by the centres of the boxes around the labelled points: the listed centre is that of the
-  /// visible surface, which lies up to 6 cm from the centre of a box that is partly hidden.
+  /// The same by the centres of boxes: the listed centre is that of the visible surface, which lies up
+  /// to 6 cm from the centre of a box that is partly hidden.
   bool ok_box = false;
 };
 

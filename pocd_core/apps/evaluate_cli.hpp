@@ -1,0 +1,35 @@
+// Command line of pocd_evaluate.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace pocd {
+
+struct EvaluateOptions {
+  std::filesystem::path scenarios = "config/sim/torwic";
+  std::string baseline = "0";
+  std::vector<std::string> names;  ///< empty: every scenario of the folder
+  std::vector<std::filesystem::path> runs;  ///< scenario files with several visits
+  std::string dataset;                      ///< recordings instead: their format
+  std::vector<std::filesystem::path> inputs;
+  std::vector<std::string> methods;
+  std::vector<std::string> variants;  ///< NAME=FILE or NAME=GROUP.KEY=VALUE,...
+  std::vector<std::uint64_t> seeds = {1, 2, 3};
+  std::vector<std::string> faults;
+  std::vector<std::filesystem::path> config;
+  std::vector<std::string> overrides;
+  std::filesystem::path output;
+  int jobs = 1;
+  bool quick = false;
+  bool pictures = true;
+  double voxel_size_m = 0.2;
+  double min_height_m = 0.1, max_height_m = 4.0;
+};
+
+/// Exit code to end with, or -1 to go on.
+int parse_command_line(int argc, char** argv, EvaluateOptions& options);
+
+}  // namespace pocd
