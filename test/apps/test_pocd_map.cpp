@@ -53,9 +53,10 @@ TEST_F(PocdMap, WritesEveryFile) {
   EXPECT_EQ(result.err, "");
   EXPECT_EQ(result.out.rfind("6 frames, 0 skipped, 0 refused; ", 0), 0u) << result.out;
 
-  EXPECT_EQ(first_line("out", "objects.csv"),
-            "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,stationarity,"
-            "alpha,beta,mu,sigma,first_seen_ns,last_seen_ns,observations,last_robot");
+  EXPECT_EQ(
+      first_line("out", "objects.csv"),
+      "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,box_z,stationarity,"
+      "alpha,beta,mu,sigma,first_seen_ns,last_seen_ns,observations,last_robot");
   EXPECT_EQ(first_line("out", "events.csv").rfind("sequence,stamp_ns,kind,object_id,", 0), 0u);
   EXPECT_EQ(first_line("out", "timing.csv"), "frame,stamp_ns,robot,stage,wall_ms");
   EXPECT_EQ(first_line("out", "map.ply"), "ply");
@@ -105,7 +106,8 @@ TEST_F(PocdMap, SummaryIsAConfigurationThatGivesTheSameMap) {
   std::ofstream(folder_.path() / "effective.yaml") << dump_config(summary("out").config);
   std::vector<std::string> again = arguments("again");
   again[4] = (folder_.path() / "effective.yaml").string();
-  ASSERT_EQ(run_command(again).exit_code, 0);
+  const CommandResult result = run_command(again);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(summary("again").map_digest, summary("out").map_digest);
 }
 

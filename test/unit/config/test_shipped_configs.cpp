@@ -36,8 +36,9 @@ TEST_P(ShippedConfig, LoadsAndSurvivesADump) {
   EXPECT_EQ(dump_config(again), text);
 }
 
-TEST_P(ShippedConfig, HasAnObjectClass) {
+TEST_P(ShippedConfig, HasAnObjectClassIfItListsClasses) {
   const ClassMap classes = load_shipped(GetParam()).classes;
+  if (classes.list.empty()) GTEST_SKIP() << "an overlay without classes";
   EXPECT_TRUE(std::any_of(classes.list.begin(), classes.list.end(),
                           [](const ClassInfo& c) { return c.role == "object"; }));
 }

@@ -53,12 +53,14 @@ TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
   object.class_id = 7;
   object.box.size_m = {1.0, 0.5, 2.0};
   object.last_robot = "robot1";
-  write_objects_csv({object}, [](ClassId) { return "box"; }, file);
+  write_objects_csv(
+      {object}, [](ClassId) { return "box"; }, file);
   const std::string text = read_text(file);
   const std::string row = text.substr(text.find('\n') + 1);
-  EXPECT_EQ(row,
-            "5,7,box,0,0.000000,0.000000,0.000000,0.000000,1.000000,0.500000,2.000000,0.67,0.67,"
-            "0.33,0,0.5,0,0,0,robot1\n");
+  EXPECT_EQ(
+      row,
+      "5,7,box,0,0.000000,0.000000,0.000000,0.000000,1.000000,0.500000,2.000000,0.000000,0.67,0.67,"
+      "0.33,0,0.5,0,0,0,robot1\n");
   EXPECT_EQ(std::count(text.begin(), text.begin() + static_cast<long>(text.find('\n')), ','),
             std::count(row.begin(), row.end(), ','));
 }
