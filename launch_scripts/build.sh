@@ -34,6 +34,13 @@ jobs=$(nproc)
 ((jobs < 1)) && jobs=1
 
 export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs
-colcon --log-level error build --merge-install --executor sequential "${selection[@]}" \
-  --event-handlers console_cohesion- desktop_notification- \
-  --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "$@"
+if ! colcon --log-level error build --merge-install --executor sequential "${selection[@]}" \
+  --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "$@"; then
+  # Ninja reports compiler errors on stdout, which colcon keeps in a file.
+  failed=$(ls -t log/latest_build/*/stdout_stderr.log 2>/dev/null | head -n 1)
+  if [[ -n "$failed" ]]; then
+    grep -A 12 -E 'FAILED:|CMake Error' "$failed" | head -n 60 >&2 || tail -n 30 "$failed" >&2
+  fi
+  echo "build.sh: failed, see above${failed:+ and $failed}" >&2
+  exit 1
+fi

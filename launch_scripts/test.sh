@@ -26,7 +26,7 @@ results=build/pocd_test
 rm -rf "$results/gtest" "$results/Testing"
 status=0
 colcon --log-level error test --merge-install --packages-select pocd_test \
-  --event-handlers console_direct+ desktop_notification- --return-code-on-test-failure \
+  --event-handlers console_direct+ --return-code-on-test-failure \
   --ctest-args --output-on-failure --parallel "$(nproc)" "${ctest_arguments[@]}" || status=$?
 
 passed=0 failed=0 skipped=0
