@@ -71,6 +71,14 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
 
   organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes, p.pool, p.cloud);
   clock.done("organize");
+  Frame placed = frame;  // images are shared, not copied
+  if (p.config.pose_refinement.enabled) {
+    const auto T_W_W = refine_pose(p.cloud, p.tracker.library(), p.config.map.max_depth_m, noise,
+                                   p.config.pose_refinement);
+    if (T_W_W) apply_correction(*T_W_W, p.cloud);
+    placed.T_W_C = p.cloud.T_W_C;
+  }
+  clock.done("pose");
   segment_planes(p.cloud, segmentation, noise, p.planes);
   vote_planes(p.planes, segmentation.majority_share, p.cloud);
   p.ground.update(p.planes, segmentation, noise, p.cloud);
@@ -80,7 +88,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   p.field.update(p.cloud);
   p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation, result);
   clock.done("objects");
-  p.integrate(frame);
+  p.integrate(placed);
   clock.done("map");
   return result;
 }

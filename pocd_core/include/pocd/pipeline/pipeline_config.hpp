@@ -11,6 +11,7 @@
 #include "pocd/input/depth_noise.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd/pipeline/pose_gate.hpp"
+#include "pocd/pipeline/pose_refinement.hpp"
 #include "pocd/segmentation/class_map.hpp"
 #include "pocd/segmentation/segmentation_config.hpp"
 #include "pocd/state/state_config.hpp"
@@ -21,6 +22,7 @@ struct PipelineConfig {
   int threads = 1;
   DepthNoise depth_noise;
   PoseGateConfig pose_gate;
+  PoseRefinementConfig pose_refinement;
   ClassMap classes;
   SegmentationConfig segmentation;
   AssociationConfig association;
@@ -33,6 +35,7 @@ struct PipelineConfig {
     visit("threads", threads, Range{1, 64}, "Threads of the pipeline; results do not depend on it.");
     visit.group("depth_noise", depth_noise, "Noise of the depth camera.");
     visit.group("pose_gate", pose_gate, "Refusing frames with impossible poses.");
+    visit.group("pose_refinement", pose_refinement, "Correcting poses by what stands still.");
     visit.group("classes", classes, "Meaning of the segmentation's class indices.");
     visit.group("segmentation", segmentation, "From image to observations.");
     visit.group("association", association, "Which observation is which object.");
