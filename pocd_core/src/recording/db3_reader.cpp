@@ -61,7 +61,7 @@ class Db3Reader : public RecordingReader {
                     (time_ns < 0 ? "a negative time" : "a topic that is not listed"));
         continue;
       }
-      if (!wanted(channels_[channel->second])) continue;
+      if (!wanted(channel->second)) continue;
       message.channel = channel->second;
       message.sequence = 0;
       message.log_time_ns = static_cast<std::uint64_t>(time_ns);

@@ -161,7 +161,7 @@ std::vector<McapReader::Entry> McapReader::entries_of(const Bytes& bytes, const 
         info_.start_ns =
             info_.messages == 1 ? header.log_time_ns : std::min(info_.start_ns, header.log_time_ns);
         info_.end_ns = std::max(info_.end_ns, header.log_time_ns);
-      } else if (header.log_time_ns < from_ || !wanted(channels_[channel->second])) {
+      } else if (header.log_time_ns < from_ || !wanted(channel->second)) {
         continue;
       }
       entries.push_back({header.log_time_ns, begin, size});

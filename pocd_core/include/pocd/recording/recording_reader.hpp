@@ -58,7 +58,10 @@ class RecordingReader {
   /// Goes on with the first message at or after the log time; 0 is the start.
   virtual void seek(std::uint64_t log_time_ns) = 0;
   /// Leaves out other channels from now on; call it before next() or seek().
-  void select(std::function<bool(const RecordedChannel&)> wanted) { wanted_ = std::move(wanted); }
+  void select(std::function<bool(const RecordedChannel&)> wanted) {
+    wanted_ = std::move(wanted);
+    decided_.clear();
+  }
 
   /// One line each: file, offset, what is wrong. At most kMostProblems; problem_count() is not
   /// bounded.
@@ -67,7 +70,13 @@ class RecordingReader {
   static constexpr std::size_t kMostProblems = 100;
 
  protected:
-  bool wanted(const RecordedChannel& channel) const { return !wanted_ || wanted_(channel); }
+  /// Asked once per channel.
+  bool wanted(std::size_t channel) {
+    while (decided_.size() <= channel) {
+      decided_.push_back(!wanted_ || wanted_(channels()[decided_.size()]));
+    }
+    return decided_[channel];
+  }
   void add_problem(const std::string& problem) {
     ++problem_count_;
     if (problems_.size() < kMostProblems) problems_.push_back(problem);
@@ -75,6 +84,7 @@ class RecordingReader {
 
  private:
   std::function<bool(const RecordedChannel&)> wanted_;
+  std::vector<bool> decided_;  // by channel
   std::vector<std::string> problems_;
   std::uint64_t problem_count_ = 0;
 };
