@@ -74,18 +74,50 @@ Eigen::Vector3d centroid(const Points& points) {
   return sum / static_cast<double>(points.size());
 }
 
-/// Aligns the observation with the object; false when they are not alike.
-bool align(LibraryObject& object, const Observation& observation, const Pose& T_W_C,
-           const AssociationConfig& config, Match& match) {
+Points icp_source(const Observation& observation, const AssociationConfig& config) {
   Points source;
   const std::size_t step = std::max<std::size_t>(1, observation.points.size() / config.icp_points);
   for (std::size_t i = 0; i < observation.points.size(); i += step) {
     source.push_back(observation.points[i].point_W);
   }
-  const auto target = target_of(object, config.icp_max_distance_m);
+  return source;
+}
+
+/// The match that an alignment stands for; nothing when too many points lie off the object.
+std::optional<Match> match_of(const IcpResult& icp, const Points& source, const Pose& T_W_C,
+                              const AssociationConfig& config) {
+  if (icp.dissimilarity > config.max_dissimilarity) return std::nullopt;
+  double distance = 0.0;
+  for (const auto& p : source) {
+    const Eigen::Vector3d here = p.cast<double>();
+    distance += (here - icp.T_target_source * here).norm();
+  }
+  const Eigen::Vector3d center = centroid(source);
+  const Eigen::Vector3d moved_C = T_W_C.linear().transpose() * (center - icp.T_target_source * center);
+  Match match;
+  match.T_new_old = icp.T_target_source.inverse();
+  match.displacement_m = distance / static_cast<double>(source.size());
+  // Positive when the observation is nearer to the camera than the object was.
+  match.sign = moved_C.z() < 0.0 ? 1 : -1;
+  match.cost = config.lambda_translation * match.displacement_m +
+               config.lambda_rotation * std::abs(Eigen::AngleAxisd(icp.T_target_source.linear()).angle());
+  match.stationary = false;
+  return match;
+}
+
+IcpOptions icp_options(const LibraryObject& object, const AssociationConfig& config) {
   IcpOptions options;
   options.max_iterations = config.icp_iterations;
   options.robust_scale_m = object.model.spacing_m();
+  return options;
+}
+
+/// Aligns an observation with an object that may be anywhere within the gate.
+std::optional<Match> align(LibraryObject& object, const Observation& observation, const Pose& T_W_C,
+                           const AssociationConfig& config) {
+  const Points source = icp_source(observation, config);
+  const auto target = target_of(object, config.icp_max_distance_m);
+  const IcpOptions options = icp_options(object, config);
   // Start with the centres on each other where that is within the gate: ICP finds the rest.
   Pose start = Pose::Identity();
   const Eigen::Vector3d offset = object.box.pose.position_W - observation.box.pose.position_W;
@@ -93,21 +125,18 @@ bool align(LibraryObject& object, const Observation& observation, const Pose& T_
   IcpResult best = point_to_plane_icp(*target, source, options, start);
   const IcpResult in_place = point_to_plane_icp(*target, source, options);
   if (in_place.dissimilarity <= best.dissimilarity) best = in_place;
-  if (best.dissimilarity > config.max_dissimilarity) return false;
-
-  const Eigen::Vector3d center = centroid(source);
-  const Eigen::Vector3d moved = center - best.T_target_source * center;  // old place to new place
-  match.T_new_old = best.T_target_source.inverse();
-  match.displacement_m = moved.norm();
-  // Positive when the observation is nearer to the camera than the object was.
-  match.sign = (T_W_C.linear().transpose() * moved).z() < 0.0 ? 1 : -1;
-  match.cost = config.lambda_translation * match.displacement_m +
-               config.lambda_rotation * std::abs(Eigen::AngleAxisd(best.T_target_source.linear()).angle());
-  match.stationary = false;
-  return true;
+  return match_of(best, source, T_W_C, config);
 }
 
 }  // namespace
+
+std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
+                                    const Pose& T_W_C, const AssociationConfig& config) {
+  if (object.model.surfels().empty() || observation.points.empty()) return std::nullopt;
+  const Points source = icp_source(observation, config);
+  const auto target = target_of(object, config.icp_max_distance_m);
+  return match_of(point_to_plane_icp(*target, source, icp_options(object, config)), source, T_W_C, config);
+}
 
 AssociationResult associate(const Candidate* candidates, std::size_t count,
                             const Observations& observations, const Pose& T_W_C,
@@ -155,7 +184,12 @@ AssociationResult associate(const Candidate* candidates, std::size_t count,
       const bool covered = touch && touch->in_front >= kMinVisible &&
                            touch->in_front > kMajority * (sighting.visible() + sighting.occluded);
       if (!(doubtful || covered) || distance >= config.max_distance_m) continue;
-      if (object.model.surfels().empty() || !align(object, observation, T_W_C, config, match)) continue;
+      if (object.model.surfels().empty()) continue;
+      const auto aligned = align(object, observation, T_W_C, config);
+      if (!aligned) continue;
+      match = *aligned;
+      match.candidate = c;
+      match.observation = static_cast<std::int32_t>(j);
       match.cost += class_cost;
       if (match.cost > config.cutoff_cost) continue;
       pairs.push_back(match);

@@ -13,6 +13,14 @@ namespace {
 constexpr double kMajority = 0.5;
 /// Points of an established object must have been measured in this many frames to bear witness.
 constexpr int kEstablishedHits = 2;
+/// An object that turned up did so on a later drive than the one on which another was last seen if the
+/// time between is this many times what has passed since.
+constexpr double kSameDrive = 3.0;
+/// When so large a share of at least so many points is off by more than half the verifying distance, the
+/// object is aligned anew; when it lies elsewhere in so many frames in a row, it has moved.
+constexpr double kOddShare = 0.25;
+constexpr int kShiftPoints = 60;
+constexpr int kDisplacedFrames = 3;
 /// An observation that adds at least this share of points shows that the object is not seen whole yet.
 constexpr double kGrowingShare = 0.03;
 /// A known object slid along itself when it lost and gained at least this share of its points.
@@ -86,6 +94,7 @@ void ObjectTracker::update_matched(Step& step) {
     const Observation& observation = step.observations.list[match.observation];
     object.frames_seen_through = 0;
     ++object.frames_in_view;
+    if (match.stationary && object.confirmed && shift_object(step, object, match, sighting)) continue;
     const double delta_m =
         geometric_change(object, observation, sighting, match, step.cloud, config_.change);
     step.evidence[object.id] = apply_measurement(object, delta_m, sighting, config_.state, config_.change);
@@ -104,6 +113,43 @@ void ObjectTracker::update_matched(Step& step) {
     fuse(step, object, piece.observation);
     step.owner_of_observation[piece.observation] = to_index(object.id);
   }
+}
+
+bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match& match, const Sighting& sighting) {
+  const double verified_m = 0.5 * config_.change.tau_m;
+  const auto touch = std::find_if(sighting.touches.begin(), sighting.touches.end(),
+                                  [&](const auto& t) { return t.observation == match.observation; });
+  int odd = touch == sighting.touches.end() ? 0 : touch->in_front;
+  const int seen = sighting.visible() + odd;
+  for (const float d : sighting.differences_m) {
+    if (std::abs(d) > 0.5 * verified_m) ++odd;
+  }
+  const bool suspicious = seen >= kShiftPoints && odd > kOddShare * seen;
+  std::optional<Match> moved;
+  if (suspicious) {
+    moved = align_in_place(object, step.observations.list[match.observation], step.cloud.T_W_C, config_.association);
+  }
+  if (!moved || moved->displacement_m < 0.6 * verified_m) {
+    object.frames_displaced = 0;
+    return false;
+  }
+  // Not fused: it would smear the model between the two places.
+  if (++object.frames_displaced < kDisplacedFrames) return true;
+  object.frames_displaced = 0;
+  const OrientedBox previous_box = object.box;
+  object.model.transform(moved->T_new_old);
+  object.icp_target.reset();
+  step.map.clear_object(object.id);
+  refit_box(step, object);
+  mark_changed(object);
+  step.evidence[object.id] = apply_measurement(object, moved->sign * moved->displacement_m, sighting,
+                                               config_.state, config_.change);
+  object.belief.mu = 0.0;  // change is measured from the new place on
+  add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
+  object.reported_box = object.box;
+  object.gained = object.lost = 0;
+  step.owner_of_observation[match.observation] = to_index(object.id);
+  return true;
 }
 
 void ObjectTracker::update_unmatched(Step& step) {
@@ -334,7 +380,10 @@ LibraryObject* ObjectTracker::added_like(const Step& step, const LibraryObject& 
       continue;
     }
     // What was found on the same drive as the object itself is not where it went.
-    if (other->first_seen_ns - object.last_seen_ns <= step.frame.stamp_ns - other->first_seen_ns) continue;
+    if (other->first_seen_ns - object.last_seen_ns <=
+        kSameDrive * static_cast<double>(step.frame.stamp_ns - other->first_seen_ns)) {
+      continue;
+    }
     const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
     if (distance > config_.state.relocation_reach_m) continue;
     if (!best || distance < best_distance) best = other, best_distance = distance;
@@ -348,10 +397,13 @@ LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject
   for (const ObjectId id : step.in_view) {
     LibraryObject* other = library_.find(id);
     if (!other || other->confirmed || other->class_id != object.class_id || other->observations < 2 ||
-        other->last_seen_ns != step.frame.stamp_ns || !alike(other->box, object.box, like_size_slack_m())) {
+        other->last_seen_ns != step.frame.stamp_ns) {
       continue;
     }
     const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
+    const bool part = other->growing && distance <= config_.state.relocation_reach_m &&
+                      fits_inside(other->box, object.box, like_size_slack_m());
+    if (!part && !alike(other->box, object.box, like_size_slack_m())) continue;
     const bool named = other->moved_from == object.id, best_named = best && best->moved_from == object.id;
     if (!best || (named && !best_named) || (named == best_named && distance < best_distance)) {
       best = other;

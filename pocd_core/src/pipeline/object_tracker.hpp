@@ -39,6 +39,9 @@ class ObjectTracker {
   void remove_or_confirm(Step& step);
   void report_changes(Step& step);
 
+  /// An object that was moved or turned a little, too little to be seen through: true when it is found
+  /// displaced (and moved, once that has lasted), so that the observation must not be fused as it is.
+  bool shift_object(Step& step, LibraryObject& object, const Match& match, const Sighting& sighting);
   void fuse(Step& step, LibraryObject& object, std::int32_t observation);
   void refit_box(Step& step, LibraryObject& object);
   /// Makes a new object the continuation of a known one: id, voxels, history.

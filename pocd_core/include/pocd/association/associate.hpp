@@ -1,6 +1,7 @@
 // Step 4 of the method: which observation is which object.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "pocd/association/association_config.hpp"
@@ -20,7 +21,7 @@ struct Match {
   std::int32_t observation = 0;
   /// Motion of the object that explains the observation [m, rad]; identity when it lies where it was.
   Pose T_new_old = Pose::Identity();
-  /// Displacement of the observation's centroid under that motion [m]; 0 when it lies where it was.
+  /// Mean displacement of the observation's points under that motion [m]; 0 when it lies where it was.
   double displacement_m = 0.0;
   /// Positive when the observation is in front of the object seen from the camera, as published.
   int sign = 1;
@@ -41,6 +42,11 @@ struct AssociationResult {
   /// observations near it do not fit it either.
   std::vector<bool> doubtful;
 };
+
+/// How an object that is still about where it was may have moved: point-to-plane ICP from its place,
+/// which moves it along no direction that its surface leaves open. Nothing when it does not fit.
+std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
+                                    const Pose& T_W_C, const AssociationConfig& config);
 
 /// Pairs within the gates (class, centroid distance or overlapping boxes). An object that most of its
 /// visible points say is in place matches the observation that they hit, without ICP; one that is in

@@ -31,6 +31,7 @@ struct LibraryObject {
   std::uint32_t observations = 0;
   int frames_in_view = 0;        ///< tentative only
   int frames_seen_through = 0;   ///< in a row
+  int frames_displaced = 0;      ///< in a row
   OrientedBox reported_box;      ///< as in the last event
   bool growing = false;          ///< the last observation added a notable share of its points
   std::size_t gained = 0;        ///< points since the last event
