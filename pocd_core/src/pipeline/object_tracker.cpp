@@ -15,7 +15,7 @@ constexpr double kMajority = 0.5;
 constexpr int kEstablishedHits = 2;
 /// An object that turned up did so on a later drive than the one on which another was last seen if the
 /// time between is this many times what has passed since.
-constexpr double kSameDrive = 3.0;
+constexpr StampNs kSameDrive = 3;
 /// When so large a share of at least so many points is off by more than half the verifying distance, the
 /// object is aligned anew; when it lies elsewhere in so many frames in a row, it has moved.
 constexpr double kOddShare = 0.25;
@@ -380,10 +380,8 @@ LibraryObject* ObjectTracker::added_like(const Step& step, const LibraryObject& 
       continue;
     }
     // What was found on the same drive as the object itself is not where it went.
-    if (other->first_seen_ns - object.last_seen_ns <=
-        kSameDrive * static_cast<double>(step.frame.stamp_ns - other->first_seen_ns)) {
-      continue;
-    }
+    const StampNs between_ns = other->first_seen_ns - object.last_seen_ns;
+    if (between_ns <= kSameDrive * (step.frame.stamp_ns - other->first_seen_ns)) continue;
     const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
     if (distance > config_.state.relocation_reach_m) continue;
     if (!best || distance < best_distance) best = other, best_distance = distance;
