@@ -366,6 +366,8 @@ void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id
   library_.rename(old, id);
   object.first_seen_ns = first_seen_ns;
   object.changed = false;  // it was listed under its old id
+  auto& retired = step.result.retired;
+  retired.erase(std::remove(retired.begin(), retired.end(), id), retired.end());
   mark_changed(object);
 }
 
