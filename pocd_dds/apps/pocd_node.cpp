@@ -13,6 +13,21 @@ std::uint64_t random_epoch() {
   return epoch == 0 ? 1 : epoch;
 }
 
+/// The group of the configuration that pocd_parameters does not know.
+struct NodeGroup {
+  pocd::dds::NodeConfig node;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit.group("node", node, "The component on the bus.");
+  }
+};
+
+constexpr const char* kParametersIntroduction =
+    "# Parameters of pocd_node\n\n"
+    "Written by `pocd_node --parameters`; do not edit. They are given in the same files as the\n"
+    "[parameters of the pipeline](parameters.md), under `node`.\n";
+
 /// Robots named on the command line take the place of those of the files.
 void set_robots(const std::vector<std::string>& names, pocd::dds::NodeConfig& node) {
   if (names.empty()) return;
@@ -41,7 +56,7 @@ int main(int argc, char** argv) {
   std::vector<std::filesystem::path> files;
   std::vector<std::string> overrides, robots;
   std::optional<std::uint64_t> epoch;
-  bool dump = false;
+  bool dump = false, show_parameters = false;
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--config", files, "Configuration file; repeat it to overlay several")
       ->allow_extra_args(false);
@@ -55,12 +70,18 @@ int main(int argc, char** argv) {
   app.add_option("--epoch", epoch, "Name of this run; default: random. Never use one twice")
       ->check(CLI::Range(std::uint64_t{1}, ~std::uint64_t{0}));
   app.add_flag("--dump", dump, "Print the effective configuration and end");
+  app.add_flag("--parameters", show_parameters,
+               "Print the page of the parameters under `node` and end");
   int domain = -1;
   pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (show_parameters) {
+    std::cout << kParametersIntroduction << pocd::parameters_markdown<NodeGroup>();
+    return std::cout.flush() ? 0 : 1;
   }
   try {
     pocd::load_config(options.config, files, overrides);

@@ -15,6 +15,15 @@ TEST(PocdParameters, CommittedPageIsCurrent) {
       << "renew it with: pocd_parameters > docs/parameters.md";
 }
 
+TEST(PocdParameters, CommittedPageOfTheNodeIsCurrent) {
+  const std::string command = std::string(POCD_BIN_DIR) + "/pocd_node";
+  if (!std::filesystem::exists(command)) GTEST_SKIP() << "built without pocd_dds";
+  const CommandResult result = run_command({command, "--parameters"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(result.out == read_text(kRoot / "docs/node_parameters.md"))
+      << "renew it with: pocd_node --parameters > docs/node_parameters.md";
+}
+
 TEST(PocdParameters, PrintsEffectiveValues) {
   const CommandResult result = run_command(
       {kCommand, "--config", (kRoot / "config/toycar.yaml").string(), "--set", "map.max_weight=7"});
