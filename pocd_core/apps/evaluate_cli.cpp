@@ -5,10 +5,11 @@
 namespace pocd {
 namespace {
 
-const std::vector<std::string> kMethods{"pocd",     "static_tsdf",      "tracked_objects", "tracked_objects_keep",
-                                        "submaps", "voxel_correction"};
-const std::vector<std::string> kDefaultMethods{"pocd", "static_tsdf", "tracked_objects", "voxel_correction",
-                                               "submaps"};
+const std::vector<std::string> kMethods{
+    "pocd",    "static_tsdf",     "tracked_objects", "tracked_objects_keep",
+    "submaps", "voxel_correction"};
+const std::vector<std::string> kDefaultMethods{"pocd", "static_tsdf", "tracked_objects",
+                                               "voxel_correction", "submaps"};
 const std::vector<std::string> kFaults{"pose_jumps", "mask_gaps", "depth_holes"};
 
 }  // namespace
@@ -16,20 +17,24 @@ const std::vector<std::string> kFaults{"pose_jumps", "mask_gaps", "depth_holes"}
 int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
   CLI::App app(
       "Compares mapping methods on routes whose last part shows a changed place.\n"
-      "Example: pocd_evaluate --config config/simulated.yaml --variant published=config/published.yaml "
+      "Example: pocd_evaluate --config config/simulated.yaml --variant "
+      "published=config/published.yaml "
       "--seeds 1,2,3 --jobs 2 --output output/evaluation\n"
-      "Recordings: pocd_evaluate --dataset torwic --input Scenario_1-1 --input Scenario_1-5 --config "
+      "Recordings: pocd_evaluate --dataset torwic --input Scenario_1-1 --input Scenario_1-5 "
+      "--config "
       "config/torwic.yaml --output output/route_1_5\n"
       "Exit code: 0 done, 1 inputs or outputs unusable, 2 usage or configuration.",
       "pocd_evaluate");
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--scenarios", o.scenarios, "Folder of scenario files")->capture_default_str();
-  app.add_option("--baseline", o.baseline, "Scenario that every route starts with")->capture_default_str();
+  app.add_option("--baseline", o.baseline, "Scenario that every route starts with")
+      ->capture_default_str();
   auto* names = app.add_option("--scenario", o.names, "Scenarios to end a route with; default: all")
                     ->delimiter(',');
   app.add_option("--run", o.runs, "Scenario file with several visits, as a route of its own")
       ->allow_extra_args(false);
-  auto* dataset = app.add_option("--dataset", o.dataset, "Format of recordings: torwic, rgbd")->excludes(names);
+  auto* dataset =
+      app.add_option("--dataset", o.dataset, "Format of recordings: torwic, rgbd")->excludes(names);
   app.add_option("--input", o.inputs, "Recording; repeat it, the last one is the reference")
       ->needs(dataset)
       ->allow_extra_args(false);
@@ -42,21 +47,25 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
   app.add_option("--seeds", o.seeds, "Seeds of the simulator's noise, separated by commas")
       ->delimiter(',')
       ->capture_default_str();
-  app.add_option("--fault", o.faults, "Faults put into the frames: pose_jumps, mask_gaps, depth_holes")
+  app.add_option("--fault", o.faults,
+                 "Faults put into the frames: pose_jumps, mask_gaps, depth_holes")
       ->delimiter(',')
       ->check(CLI::IsMember(kFaults));
   app.add_option("--config", o.config, "Configuration file; repeat it to overlay several")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--set", o.overrides, "Override one parameter: GROUP.KEY=VALUE")->allow_extra_args(false);
-  app.add_option("--output", o.output, "Folder for tables and pictures, made if missing")->required();
+  app.add_option("--set", o.overrides, "Override one parameter: GROUP.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--output", o.output, "Folder for tables and pictures, made if missing")
+      ->required();
   app.add_option("--jobs", o.jobs, "Routes evaluated at the same time")->check(CLI::Range(1, 64));
   app.add_flag("--quick", o.quick, "Few scenarios, one seed");
   app.add_flag("!--no-pictures", o.pictures, "Tables only");
   app.add_option("--voxel-size", o.voxel_size_m, "Voxels that are compared [m]")
       ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
-  app.add_option("--min-height", o.min_height_m, "Surface below is not judged: the floor [m, map frame]")
+  app.add_option("--min-height", o.min_height_m,
+                 "Surface below is not judged: the floor [m, map frame]")
       ->capture_default_str();
   app.add_option("--max-height", o.max_height_m, "Surface above is not judged [m, map frame]")
       ->capture_default_str();

@@ -11,7 +11,7 @@ namespace pocd {
 struct EvaluateOptions {
   std::filesystem::path scenarios = "config/sim/torwic";
   std::string baseline = "0";
-  std::vector<std::string> names;  ///< empty: every scenario of the folder
+  std::vector<std::string> names;           ///< empty: every scenario of the folder
   std::vector<std::filesystem::path> runs;  ///< scenario files with several visits
   std::string dataset;                      ///< recordings instead: their format
   std::vector<std::filesystem::path> inputs;

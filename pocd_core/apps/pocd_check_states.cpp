@@ -1,4 +1,5 @@
-// Runs the pipeline on recordings whose truth is known and prints what it holds beside what is there.
+// Runs the pipeline on recordings whose truth is known and prints what it holds beside what is
+// there.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <iostream>
@@ -14,9 +15,10 @@ int check_states(const std::filesystem::path& folder, const std::filesystem::pat
                  const pocd::PipelineConfig& config) {
   pocd::StateTruth truth;
   pocd::load_config(truth, {truth_file});
-  const pocd::StateRun run = pocd::run_states(truth, folder, config, [](const pocd::StateRun& so_far) {
-    std::cout << pocd::describe_last_state(so_far) << std::flush;
-  });
+  const pocd::StateRun run =
+      pocd::run_states(truth, folder, config, [](const pocd::StateRun& so_far) {
+        std::cout << pocd::describe_last_state(so_far) << std::flush;
+      });
   std::size_t listed = 0, box = 0;
   for (const pocd::StateVerdict& verdict : run.verdicts) {
     listed += verdict.ok_listed;
@@ -37,7 +39,8 @@ int check_still(const pocd::DatasetOptions& options, const pocd::PipelineConfig&
     ++frames;
     for (const pocd::ObjectEvent& event : pipeline.process_frame(*frame).events) {
       added += event.kind == pocd::EventKind::kAdded;
-      if (event.kind != pocd::EventKind::kRemoved && event.kind != pocd::EventKind::kMoved) continue;
+      if (event.kind != pocd::EventKind::kRemoved && event.kind != pocd::EventKind::kMoved)
+        continue;
       ++wrong;
       const Eigen::Vector3d& p = event.box.pose.position_W;
       const Eigen::Vector3d& s = event.box.size_m;
@@ -57,7 +60,8 @@ int check_still(const pocd::DatasetOptions& options, const pocd::PipelineConfig&
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Checks the pipeline on recordings whose truth is known: --states, a labelled table in several "
+      "Checks the pipeline on recordings whose truth is known: --states, a labelled table in "
+      "several "
       "states; --still, a hand-held video of a place where nothing changes.\n"
       "Example: pocd_check_states --states tabletop_states --truth test/data/tabletop_truth.yaml "
       "--config config/tabletop.yaml\n"
@@ -69,7 +73,8 @@ int main(int argc, char** argv) {
   std::vector<double> gravity;
   std::size_t max_frames = 0;
   app.set_version_flag("--version", POCD_VERSION);
-  auto* states_option = app.add_option("--states", states, "Folder of labelled PCD files, one per state");
+  auto* states_option =
+      app.add_option("--states", states, "Folder of labelled PCD files, one per state");
   app.add_option("--truth", truth, "Truth of the states (YAML)")->needs(states_option);
   auto* still_option = app.add_option("--still", still, "Folder of frames in the rgbd layout");
   still_option->excludes(states_option);
@@ -80,7 +85,8 @@ int main(int argc, char** argv) {
   app.add_option("--config", files, "Configuration file; repeat it to overlay several")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--set", overrides, "Override one parameter: GROUP.KEY=VALUE")->allow_extra_args(false);
+  app.add_option("--set", overrides, "Override one parameter: GROUP.KEY=VALUE")
+      ->allow_extra_args(false);
   try {
     app.parse(argc, argv);
     if (states.empty() == still.empty()) throw CLI::ValidationError("give --states or --still");
@@ -100,8 +106,10 @@ int main(int argc, char** argv) {
     pocd::DatasetOptions options;
     options.format = "rgbd";
     options.inputs = {still};
-    if (!gravity.empty()) options.gravity_W = Eigen::Vector3d(gravity[0], gravity[1], gravity[2]).normalized();
-    return check_still(options, config, max_frames == 0 ? static_cast<std::size_t>(-1) : max_frames);
+    if (!gravity.empty())
+      options.gravity_W = Eigen::Vector3d(gravity[0], gravity[1], gravity[2]).normalized();
+    return check_still(options, config,
+                       max_frames == 0 ? static_cast<std::size_t>(-1) : max_frames);
   } catch (const std::exception& error) {
     std::cerr << "pocd_check_states: " << error.what() << '\n';
     return 1;

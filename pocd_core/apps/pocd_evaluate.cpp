@@ -40,13 +40,15 @@ std::vector<Route> list_routes(const pocd::EvaluateOptions& o) {
   std::vector<Route> routes;
   if (!o.dataset.empty()) {
     std::string name;
-    for (const fs::path& input : o.inputs) name += (name.empty() ? "" : "+") + input.filename().string();
+    for (const fs::path& input : o.inputs)
+      name += (name.empty() ? "" : "+") + input.filename().string();
     return {{name, o.inputs}};
   }
   for (const fs::path& file : o.runs) routes.push_back({file.stem().string(), {file}});
   std::vector<std::string> names = o.names;
   if (names.empty() && o.runs.empty()) {
-    if (!fs::is_directory(o.scenarios)) throw pocd::InputError(o.scenarios.string() + ": no such folder");
+    if (!fs::is_directory(o.scenarios))
+      throw pocd::InputError(o.scenarios.string() + ": no such folder");
     for (const auto& entry : fs::directory_iterator(o.scenarios)) {
       if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
     }
@@ -59,11 +61,13 @@ std::vector<Route> list_routes(const pocd::EvaluateOptions& o) {
   return routes;
 }
 
-std::vector<pocd::MethodSpec> list_methods(const pocd::EvaluateOptions& o, const pocd::PipelineConfig& config) {
+std::vector<pocd::MethodSpec> list_methods(const pocd::EvaluateOptions& o,
+                                           const pocd::PipelineConfig& config) {
   std::vector<pocd::MethodSpec> specs;
   for (const std::string& name : o.methods) {
     if (name == "pocd") specs.push_back({name, [=] { return pocd::make_pocd_method(config); }});
-    if (name == "static_tsdf") specs.push_back({name, [=] { return pocd::make_static_tsdf_method(config); }});
+    if (name == "static_tsdf")
+      specs.push_back({name, [=] { return pocd::make_static_tsdf_method(config); }});
     if (name == "tracked_objects") {
       specs.push_back({name, [=] { return pocd::make_tracked_objects_method(config, false); }});
     }
@@ -73,7 +77,8 @@ std::vector<pocd::MethodSpec> list_methods(const pocd::EvaluateOptions& o, const
     if (name == "voxel_correction") {
       specs.push_back({name, [=] { return pocd::make_voxel_correction_method(config); }});
     }
-    if (name == "submaps") specs.push_back({name, [=] { return pocd::make_submap_method(config); }});
+    if (name == "submaps")
+      specs.push_back({name, [=] { return pocd::make_submap_method(config); }});
   }
   for (const std::string& variant : o.variants) {
     const std::size_t equals = variant.find('=');
@@ -108,7 +113,8 @@ class Progress {
   void done(const std::string& what) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++done_;
-    std::fprintf(stderr, "%s%zu of %zu: %s\n", shown_ ? "\r\033[K" : "", done_.load(), total_, what.c_str());
+    std::fprintf(stderr, "%s%zu of %zu: %s\n", shown_ ? "\r\033[K" : "", done_.load(), total_,
+                 what.c_str());
   }
 
  private:
@@ -121,10 +127,14 @@ class Progress {
 class Evaluation {
  public:
   Evaluation(const pocd::EvaluateOptions& options, const pocd::PipelineConfig& config)
-      : options_(options), config_(config), routes_(list_routes(options)), methods_(list_methods(options, config)) {
+      : options_(options),
+        config_(config),
+        routes_(list_routes(options)),
+        methods_(list_methods(options, config)) {
     voxels_.voxel_size_m = options.voxel_size_m;
     voxels_.map_voxel_m = config.map.voxel_size_m;
     voxels_.tolerance_m = config.map.voxel_size_m;
+    voxels_.offset_m = config.map.voxel_size_m;
     voxels_.min_height_m = options.min_height_m;
     voxels_.max_height_m = options.max_height_m;
     for (const Route& route : routes_) {
@@ -146,8 +156,9 @@ class Evaluation {
     const auto work = [&] {
       for (std::size_t n = next++; n < jobs_.size(); n = next++) {
         try {
-          scores[n] = pocd::evaluate_run(input_of(jobs_[n]), methods_, voxels_, config_.map.max_depth_m,
-                                         [&](std::size_t) { progress.frame(); });
+          scores[n] =
+              pocd::evaluate_run(input_of(jobs_[n]), methods_, voxels_, config_.map.max_depth_m,
+                                 [&](std::size_t) { progress.frame(); });
           progress.done(jobs_[n].route->name + " seed " + std::to_string(jobs_[n].seed));
         } catch (...) {
           const std::lock_guard<std::mutex> lock(mutex);
@@ -206,7 +217,8 @@ class Evaluation {
   }
 
   /// Made once per route, for all its seeds.
-  std::shared_ptr<const pocd::SceneTruth> truth_of(const Route& route, const pocd::Scenario& scenario) {
+  std::shared_ptr<const pocd::SceneTruth> truth_of(const Route& route,
+                                                   const pocd::Scenario& scenario) {
     const std::lock_guard<std::mutex> lock(truth_mutex_);
     auto& truth = truths_[&route];
     if (!truth) {
@@ -229,7 +241,8 @@ class Evaluation {
 };
 
 void write_results(const pocd::EvaluateOptions& o, const pocd::PipelineConfig& config,
-                   const pocd::VoxelMetricsConfig& voxels, const std::vector<pocd::RunScore>& runs) {
+                   const pocd::VoxelMetricsConfig& voxels,
+                   const std::vector<pocd::RunScore>& runs) {
   const std::vector<pocd::MethodSummary> summaries = pocd::summarize(runs);
   pocd::write_markdown(runs, o.output / "evaluation.md");
   pocd::write_scores_csv(runs, o.output / "scores.csv");
@@ -238,7 +251,8 @@ void write_results(const pocd::EvaluateOptions& o, const pocd::PipelineConfig& c
   if (!o.pictures) return;
   for (const pocd::MethodSummary& summary : summaries) {
     if (summary.calibration.count() == 0) continue;
-    pocd::draw_reliability(summary.calibration, summary.method, o.output / ("reliability_" + summary.method + ".png"));
+    pocd::draw_reliability(summary.calibration, summary.method,
+                           o.output / ("reliability_" + summary.method + ".png"));
   }
   for (const pocd::RunScore& run : runs) {
     if (run.seed != runs.front().seed) continue;
@@ -249,7 +263,8 @@ void write_results(const pocd::EvaluateOptions& o, const pocd::PipelineConfig& c
                         run.route + "  " + m.method + (m.by_truth ? "  against the truth" : ""),
                         folder / ("birdseye_" + m.method + ".png"));
       if (m.histories.empty()) continue;
-      pocd::draw_histories(m, config.state.remove_below, folder / ("stationarity_" + m.method + ".png"));
+      pocd::draw_histories(m, config.state.remove_below,
+                           folder / ("stationarity_" + m.method + ".png"));
     }
   }
 }

@@ -32,7 +32,8 @@ std::uint64_t Calibration::count() const {
 double Calibration::expected_error() const {
   if (count() == 0) return std::numeric_limits<double>::quiet_NaN();
   double error = 0.0;
-  for (const Bin& bin : bins_) error += std::abs(static_cast<double>(bin.true_count) - bin.sum_predicted);
+  for (const Bin& bin : bins_)
+    error += std::abs(static_cast<double>(bin.true_count) - bin.sum_predicted);
   return error / static_cast<double>(count());
 }
 

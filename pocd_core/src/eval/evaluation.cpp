@@ -41,12 +41,13 @@ std::vector<std::vector<OrientedBox>> places_until(const SceneTruth& truth, std:
   return places;
 }
 
-void note(const FrameResult& result, std::size_t frame, const std::vector<std::vector<OrientedBox>>& places,
-          Contestant& c) {
+void note(const FrameResult& result, std::size_t frame,
+          const std::vector<std::vector<OrientedBox>>& places, Contestant& c) {
   c.score.refused += !result.accepted;
   for (const ObjectEvent& event : result.events) {
     c.run.events.push_back({event, frame});
-    c.score.removed_or_moved += event.kind == EventKind::kRemoved || event.kind == EventKind::kMoved;
+    c.score.removed_or_moved +=
+        event.kind == EventKind::kRemoved || event.kind == EventKind::kMoved;
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
     c.score.histories[object.id].emplace_back(frame, object.belief.stationarity());
@@ -106,7 +107,8 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
     const Points map_W = c.route->surface();
     c.score.by_reference = score_against_reference(map_W, c.alone->surface(), measured, voxels);
     if (input.truth) {
-      c.score.by_truth = score_against_truth(map_W, input.truth->surface, input.truth->observed, voxels);
+      c.score.by_truth =
+          score_against_truth(map_W, input.truth->surface, input.truth->observed, voxels);
       if (c.route->has_objects()) c.score.objects = score_objects(c.run, *input.truth);
     }
     c.score.frames = frames;

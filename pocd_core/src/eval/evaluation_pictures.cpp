@@ -14,9 +14,9 @@ namespace {
 constexpr int kCell_px = 10, kBorder_px = 30;
 const cv::Scalar kWhite(255, 255, 255), kBlack(0, 0, 0), kGrey(200, 200, 200);
 // Blue, green, red. Distinct hues (Okabe and Ito's palette for the colour blind).
-const std::array<cv::Scalar, 8> kLines{cv::Scalar(178, 114, 0), cv::Scalar(0, 94, 213),
-                                       cv::Scalar(115, 158, 0), cv::Scalar(167, 121, 204),
-                                       cv::Scalar(0, 159, 230), cv::Scalar(233, 180, 86),
+const std::array<cv::Scalar, 8> kLines{cv::Scalar(178, 114, 0),  cv::Scalar(0, 94, 213),
+                                       cv::Scalar(115, 158, 0),  cv::Scalar(167, 121, 204),
+                                       cv::Scalar(0, 159, 230),  cv::Scalar(233, 180, 86),
                                        cv::Scalar(66, 228, 240), cv::Scalar(90, 90, 90)};
 
 void label(cv::Mat& image, const std::string& text, const cv::Point& at, double scale = 0.45) {
@@ -36,7 +36,8 @@ class Plot {
       const cv::Point left = at(low_, i / 10.0), right = at(high_, i / 10.0);
       cv::line(image_, left, right, kGrey);
       label(image_, "0." + std::to_string(i % 10), {left.x - 30, left.y + 4}, 0.35);
-      if (i == 10) cv::rectangle(image_, cv::Rect(left.x - 32, left.y - 8, 30, 14), kWhite, cv::FILLED);
+      if (i == 10)
+        cv::rectangle(image_, cv::Rect(left.x - 32, left.y - 8, 30, 14), kWhite, cv::FILLED);
       if (i == 10) label(image_, "1.0", {left.x - 30, left.y + 4}, 0.35);
     }
     cv::rectangle(image_, at(low_, 0), at(high_, 1), kBlack);
@@ -91,7 +92,8 @@ void draw_voxels(const VoxelScore& score, double voxel_size_m, const std::string
   write(image, file);
 }
 
-void draw_histories(const MethodScore& score, double remove_below, const std::filesystem::path& file) {
+void draw_histories(const MethodScore& score, double remove_below,
+                    const std::filesystem::path& file) {
   std::set<ObjectId> changed;
   for (const auto& timed : score.events) {
     if (timed.event.kind == EventKind::kRemoved || timed.event.kind == EventKind::kMoved) {
@@ -112,24 +114,27 @@ void draw_histories(const MethodScore& score, double remove_below, const std::fi
   }
   if (ids.size() > kLines.size()) ids.resize(kLines.size());
   Plot plot(900, 420, 0.0, static_cast<double>(score.frames));
-  cv::line(plot.image(), plot.at(0, remove_below), plot.at(static_cast<double>(score.frames), remove_below),
-           cv::Scalar(54, 67, 244), 1, cv::LINE_AA);
+  cv::line(plot.image(), plot.at(0, remove_below),
+           plot.at(static_cast<double>(score.frames), remove_below), cv::Scalar(54, 67, 244), 1,
+           cv::LINE_AA);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const History& history = score.histories.at(ids[i]);
     for (std::size_t n = 0; n < history.size(); ++n) {
       const cv::Point now = plot.at(static_cast<double>(history[n].first), history[n].second);
       // A gap in time, during which the object was out of view, is drawn as a step.
       if (n > 0) {
-        const cv::Point before = plot.at(static_cast<double>(history[n - 1].first), history[n - 1].second);
+        const cv::Point before =
+            plot.at(static_cast<double>(history[n - 1].first), history[n - 1].second);
         cv::line(plot.image(), before, {now.x, before.y}, kLines[i], 1, cv::LINE_AA);
         cv::line(plot.image(), {now.x, before.y}, now, kLines[i], 2, cv::LINE_AA);
       } else {
         cv::circle(plot.image(), now, 3, kLines[i], cv::FILLED, cv::LINE_AA);
       }
     }
-    const std::string name = std::to_string(to_index(ids[i])) + (changed.count(ids[i]) ? " changed" : "");
-    cv::putText(plot.image(), name, {60 + static_cast<int>(i) * 100, 30}, cv::FONT_HERSHEY_SIMPLEX, 0.4,
-                kLines[i], 1, cv::LINE_AA);
+    const std::string name =
+        std::to_string(to_index(ids[i])) + (changed.count(ids[i]) ? " changed" : "");
+    cv::putText(plot.image(), name, {60 + static_cast<int>(i) * 100, 30}, cv::FONT_HERSHEY_SIMPLEX,
+                0.4, kLines[i], 1, cv::LINE_AA);
   }
   label(plot.image(), "E[v] of objects over frames, " + score.method, {60, 14}, 0.4);
   write(plot.image(), file);
@@ -144,7 +149,8 @@ void draw_reliability(const Calibration& calibration, const std::string& title,
     if (bin.count == 0) continue;
     const auto n = static_cast<double>(bin.count);
     const cv::Point at = plot.at(bin.sum_predicted / n, static_cast<double>(bin.true_count) / n);
-    const int radius = 2 + static_cast<int>(10.0 * std::sqrt(n / static_cast<double>(calibration.count())));
+    const int radius =
+        2 + static_cast<int>(10.0 * std::sqrt(n / static_cast<double>(calibration.count())));
     cv::circle(plot.image(), at, radius, kLines[0], 1, cv::LINE_AA);
     if (before) cv::line(plot.image(), *before, at, kLines[0], 2, cv::LINE_AA);
     before = at;

@@ -39,9 +39,9 @@ double median_delay(const std::vector<double>& delays) {
   return delays.empty() ? std::nan("") : delays[(delays.size() - 1) / 2];
 }
 
-const std::vector<std::string> kColumns{
-    "method", "P ref", "R ref",  "FPR ref", "P truth", "R truth",   "FPR truth",    "F1 change",
-    "F1 place", "false", "delay", "ECE",     "CPU ms"};
+const std::vector<std::string> kColumns{"method",  "P ref",     "R ref",     "FPR ref",  "P truth",
+                                        "R truth", "FPR truth", "F1 change", "F1 place", "false",
+                                        "delay",   "ECE",       "CPU ms"};
 
 std::vector<std::string> cells(const MethodSummary& m) {
   const auto object = [&](double value) { return m.objects ? share(value) : std::string("-"); };
@@ -173,8 +173,8 @@ void write_markdown(const std::vector<RunScore>& runs, const std::filesystem::pa
     if (!m.objects) continue;
     std::vector<std::string> row{m.method};
     for (const ChangeKind kind : kKinds) {
-      row.push_back(share(m.objects->precision(kind)) + " / " + share(m.objects->recall(kind)) + " / " +
-                    share(m.objects->f1(kind)));
+      row.push_back(share(m.objects->precision(kind)) + " / " + share(m.objects->recall(kind)) +
+                    " / " + share(m.objects->f1(kind)));
     }
     row.push_back(std::to_string(m.objects->changes.size()));
     row.push_back(std::to_string(m.objects->unseen_changes));
@@ -190,24 +190,28 @@ void write_markdown(const std::vector<RunScore>& runs, const std::filesystem::pa
 }
 
 void write_scores_csv(const std::vector<RunScore>& runs, const std::filesystem::path& file) {
-  CsvFile csv(file,
-              "route,seed,method,precision_ref,recall_ref,fpr_ref,precision_truth,recall_truth,fpr_truth,"
-              "tp_truth,fp_truth,fn_truth,tn_truth,change_precision,change_recall,change_f1,place_f1,"
-              "false_changes,removed_or_moved,median_delay_frames,ece,cpu_ms_per_frame,frames,refused");
+  CsvFile csv(
+      file,
+      "route,seed,method,precision_ref,recall_ref,fpr_ref,precision_truth,recall_truth,fpr_truth,"
+      "tp_truth,fp_truth,fn_truth,tn_truth,change_precision,change_recall,change_f1,place_f1,"
+      "false_changes,removed_or_moved,median_delay_frames,ece,cpu_ms_per_frame,frames,refused");
   for (const RunScore& run : runs) {
     for (const MethodScore& m : run.methods) {
       const VoxelScore truth = m.by_truth.value_or(VoxelScore{});
       std::vector<std::string> row{run.route, std::to_string(run.seed), m.method};
-      const auto number = [&](double value) { row.push_back(std::isnan(value) ? "" : text("%.4f", value)); };
+      const auto number = [&](double value) {
+        row.push_back(std::isnan(value) ? "" : text("%.4f", value));
+      };
       number(m.by_reference.precision()), number(m.by_reference.recall());
       number(m.by_reference.false_positive_rate());
       number(truth.precision()), number(truth.recall()), number(truth.false_positive_rate());
-      for (const std::int64_t n : {truth.true_positives, truth.false_positives, truth.false_negatives,
-                                   truth.true_negatives}) {
+      for (const std::int64_t n : {truth.true_positives, truth.false_positives,
+                                   truth.false_negatives, truth.true_negatives}) {
         row.push_back(std::to_string(n));
       }
       const double none = std::nan("");
-      number(m.objects ? m.objects->precision() : none), number(m.objects ? m.objects->recall() : none);
+      number(m.objects ? m.objects->precision() : none),
+          number(m.objects ? m.objects->recall() : none);
       number(m.objects ? m.objects->f1() : none), number(m.objects ? m.objects->place_f1() : none);
       row.push_back(m.objects ? std::to_string(m.objects->false_changes) : "");
       row.push_back(std::to_string(m.removed_or_moved));
@@ -222,15 +226,22 @@ void write_scores_csv(const std::vector<RunScore>& runs, const std::filesystem::
 
 void write_changes_csv(const std::vector<RunScore>& runs, const std::filesystem::path& file) {
   CsvFile csv(file,
-              "route,seed,method,what,kind,name,verdict,clear_frame,frame,x_before,y_before,z_before,x_after,"
+              "route,seed,method,what,kind,name,verdict,clear_frame,frame,x_before,y_before,z_"
+              "before,x_after,"
               "y_after,z_after");
   for (const RunScore& run : runs) {
     for (const MethodScore& m : run.methods) {
       if (!m.objects) continue;
       for (const ObjectScore::Found& found : m.objects->changes) {
-        std::vector<std::string> row{run.route, std::to_string(run.seed), m.method, "truth",
-                                     to_string(found.truth.change.kind), found.truth.change.name,
-                                     found.exact ? "found" : found.place ? "place" : "missed",
+        std::vector<std::string> row{run.route,
+                                     std::to_string(run.seed),
+                                     m.method,
+                                     "truth",
+                                     to_string(found.truth.change.kind),
+                                     found.truth.change.name,
+                                     found.exact   ? "found"
+                                     : found.place ? "place"
+                                                   : "missed",
                                      std::to_string(*found.truth.clear_frame()),
                                      found.exact_frame ? std::to_string(*found.exact_frame) : ""};
         append(row, place_cells(found.truth.change.before));
@@ -238,9 +249,15 @@ void write_changes_csv(const std::vector<RunScore>& runs, const std::filesystem:
         csv.row(row);
       }
       for (const auto& [net, verdict] : m.objects->nets) {
-        std::vector<std::string> row{run.route, std::to_string(run.seed), m.method, "net",
-                                     to_string(net.kind), std::to_string(to_index(net.object)),
-                                     to_text(verdict), "", std::to_string(net.frame)};
+        std::vector<std::string> row{run.route,
+                                     std::to_string(run.seed),
+                                     m.method,
+                                     "net",
+                                     to_string(net.kind),
+                                     std::to_string(to_index(net.object)),
+                                     to_text(verdict),
+                                     "",
+                                     std::to_string(net.frame)};
         append(row, place_cells(net.before));
         append(row, place_cells(net.after));
         csv.row(row);
@@ -250,15 +267,17 @@ void write_changes_csv(const std::vector<RunScore>& runs, const std::filesystem:
   csv.close();
 }
 
-void write_calibration_csv(const std::vector<MethodSummary>& methods, const std::filesystem::path& file) {
+void write_calibration_csv(const std::vector<MethodSummary>& methods,
+                           const std::filesystem::path& file) {
   CsvFile csv(file, "method,bin_low,bin_high,count,mean_predicted,share_true");
   for (const MethodSummary& m : methods) {
     for (int b = 0; b < Calibration::kBins; ++b) {
       const Calibration::Bin& bin = m.calibration.bins()[static_cast<std::size_t>(b)];
       if (bin.count == 0) continue;
       const auto n = static_cast<double>(bin.count);
-      csv.row({m.method, text("%.1f", b * 0.1), text("%.1f", (b + 1) * 0.1), std::to_string(bin.count),
-               text("%.4f", bin.sum_predicted / n), text("%.4f", static_cast<double>(bin.true_count) / n)});
+      csv.row({m.method, text("%.1f", b * 0.1), text("%.1f", (b + 1) * 0.1),
+               std::to_string(bin.count), text("%.4f", bin.sum_predicted / n),
+               text("%.4f", static_cast<double>(bin.true_count) / n)});
     }
   }
   csv.close();

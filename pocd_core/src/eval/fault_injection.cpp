@@ -31,7 +31,8 @@ void inject_faults(const FaultOptions& options, StampNs start_ns, Frame& frame) 
   if (options.mask_gaps) chosen[count++] = Fault::kMaskGap;
   if (options.depth_holes) chosen[count++] = Fault::kDepthHoles;
   if (count == 0) return;
-  const double time_s = static_cast<double>(frame.stamp_ns - start_ns) * 1e-9 - options.period_s / 2.0;
+  const double time_s =
+      static_cast<double>(frame.stamp_ns - start_ns) * 1e-9 - options.period_s / 2.0;
   if (time_s < 0.0) return;
   const auto episode = static_cast<std::uint64_t>(time_s / options.period_s);
   const double into_s = time_s - static_cast<double>(episode) * options.period_s;
@@ -41,7 +42,8 @@ void inject_faults(const FaultOptions& options, StampNs start_ns, Frame& frame) 
       const double lasts_s = kFrame_s * static_cast<double>(1 + of_episode.below(5));
       const double heading = of_episode.uniform(-M_PI, M_PI);
       if (into_s >= lasts_s) return;
-      frame.T_W_C.translation() += options.jump_m * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
+      frame.T_W_C.translation() +=
+          options.jump_m * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
       return;
     }
     case Fault::kMaskGap:
@@ -49,7 +51,8 @@ void inject_faults(const FaultOptions& options, StampNs start_ns, Frame& frame) 
       return;
     case Fault::kDepthHoles: {
       if (into_s >= options.gap_s) return;
-      Random of_frame(options.seed ^ (static_cast<std::uint64_t>(frame.stamp_ns) * 0xBF58476D1CE4E5B9ull));
+      Random of_frame(options.seed ^
+                      (static_cast<std::uint64_t>(frame.stamp_ns) * 0xBF58476D1CE4E5B9ull));
       punch_holes(of_frame, options.hole_share, frame.depth_m);
       return;
     }

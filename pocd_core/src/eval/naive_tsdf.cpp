@@ -66,8 +66,10 @@ void NaiveTsdf::integrate(const Frame& frame, const cv::Mat& mask) {
     const float z = center_C.z();
     if (z < -block_radius_m || z > max_depth_m + truncation_m + block_radius_m) continue;
     const float reach = std::max(z, 0.0f) + block_radius_m;
-    if (std::abs(center_C.x()) > reach * static_cast<float>(camera.width) / fx + 2.0f * block_radius_m ||
-        std::abs(center_C.y()) > reach * static_cast<float>(camera.height) / fy + 2.0f * block_radius_m) {
+    if (std::abs(center_C.x()) >
+            reach * static_cast<float>(camera.width) / fx + 2.0f * block_radius_m ||
+        std::abs(center_C.y()) >
+            reach * static_cast<float>(camera.height) / fy + 2.0f * block_radius_m) {
       continue;
     }
     int i = 0;
@@ -95,7 +97,8 @@ void NaiveTsdf::integrate(const Frame& frame, const cv::Mat& mask) {
           const auto n = static_cast<std::size_t>(i);
           const float total = block->weight[n] + weight;
           block->distance[n] =
-              (block->distance[n] * block->weight[n] + std::min(s / truncation_m, 1.0f) * weight) / total;
+              (block->distance[n] * block->weight[n] + std::min(s / truncation_m, 1.0f) * weight) /
+              total;
           block->weight[n] = std::min(total, max_weight_);
         }
       }
@@ -124,13 +127,15 @@ void NaiveTsdf::merge(const NaiveTsdf& other) {
     for (std::size_t i = 0; i < to.weight.size(); ++i) {
       const float total = to.weight[i] + from->weight[i];
       if (from->weight[i] <= 0.0f) continue;
-      to.distance[i] = (to.distance[i] * to.weight[i] + from->distance[i] * from->weight[i]) / total;
+      to.distance[i] =
+          (to.distance[i] * to.weight[i] + from->distance[i] * from->weight[i]) / total;
       to.weight[i] = std::min(total, max_weight_);
     }
   }
 }
 
-bool NaiveTsdf::distance_at(const Eigen::Vector3f& point_W, float min_weight, float& distance) const {
+bool NaiveTsdf::distance_at(const Eigen::Vector3f& point_W, float min_weight,
+                            float& distance) const {
   const Eigen::Vector3f voxel = point_W / static_cast<float>(config_.voxel_size_m);
   const Eigen::Array3i n = voxel.array().floor().cast<int>();
   const auto down = [](int a) { return a >= 0 ? a / kSide : -((kSide - 1 - a) / kSide); };
@@ -138,7 +143,8 @@ bool NaiveTsdf::distance_at(const Eigen::Vector3f& point_W, float min_weight, fl
   const auto it = index_.find(key);
   if (it == index_.end()) return false;
   const Block& block = *blocks_[it->second];
-  const int i = (n.x() - kSide * key.x) + kSide * ((n.y() - kSide * key.y) + kSide * (n.z() - kSide * key.z));
+  const int i =
+      (n.x() - kSide * key.x) + kSide * ((n.y() - kSide * key.y) + kSide * (n.z() - kSide * key.z));
   distance = block.distance[static_cast<std::size_t>(i)];
   return block.weight[static_cast<std::size_t>(i)] >= min_weight;
 }

@@ -11,9 +11,9 @@
 
 namespace pocd {
 
-/// Curless and Levoy (SIGGRAPH 1996) with the weights of Voxblox (Oleynikova et al., IROS 2017): 1 / z^2,
-/// falling off linearly behind the surface from one voxel on. Free space in front of the surface is
-/// averaged in like any other observation. Not thread-safe.
+/// Curless and Levoy (SIGGRAPH 1996) with the weights of Voxblox (Oleynikova et al., IROS 2017): 1
+/// / z^2, falling off linearly behind the surface from one voxel on. Free space in front of the
+/// surface is averaged in like any other observation. Not thread-safe.
 class NaiveTsdf {
  public:
   struct Block {
@@ -23,10 +23,11 @@ class NaiveTsdf {
   };
 
   /// max_weight in units of observations at 1 m.
-  NaiveTsdf(const TsdfConfig& config, float max_weight) : config_(config), max_weight_(max_weight) {}
+  NaiveTsdf(const TsdfConfig& config, float max_weight)
+      : config_(config), max_weight_(max_weight) {}
 
-  /// `mask` (CV_8UC1 of the frame's size, or empty): pixels with 0 are not used at all; pixels below 2
-  /// make no new blocks but may update those that are there.
+  /// `mask` (CV_8UC1 of the frame's size, or empty): pixels with 0 are not used at all; pixels
+  /// below 2 make no new blocks but may update those that are there.
   void integrate(const Frame& frame, const cv::Mat& mask);
 
   /// See surface_points; min_weight in the units of max_weight.
@@ -46,7 +47,7 @@ class NaiveTsdf {
 
   TsdfConfig config_;
   float max_weight_;
-  std::vector<std::unique_ptr<Block>> blocks_;  // in order of creation
+  std::vector<std::unique_ptr<Block>> blocks_;                     // in order of creation
   std::unordered_map<BlockKey, std::size_t, BlockKeyHash> index_;  // look-up only
 };
 

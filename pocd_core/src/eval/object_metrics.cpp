@@ -12,9 +12,11 @@ namespace {
 
 bool right_move(const NetChange& net, const TruthChange& change) {
   if (!net.before || !net.after || !change.before || !change.after) return false;
-  if (!same_place(*net.before, *change.before) || !same_place(*net.after, *change.after)) return false;
+  if (!same_place(*net.before, *change.before) || !same_place(*net.after, *change.after))
+    return false;
   const Eigen::Vector2d said = (net.after->pose.position_W - net.before->pose.position_W).head<2>();
-  const Eigen::Vector2d was = (change.after->pose.position_W - change.before->pose.position_W).head<2>();
+  const Eigen::Vector2d was =
+      (change.after->pose.position_W - change.before->pose.position_W).head<2>();
   // Growth of a partial view moves a box's centre by a few decimetres.
   return (said - was).norm() <= std::max(0.25, 0.5 * was.norm());
 }
@@ -51,7 +53,8 @@ std::optional<NetChange> net_of(const std::vector<const RunEvents::Timed*>& even
       continue;
     }
     if (first) {
-      if (event.kind == EventKind::kMoved) before = event.previous_box ? event.previous_box : event.box;
+      if (event.kind == EventKind::kMoved)
+        before = event.previous_box ? event.previous_box : event.box;
       if (event.kind == EventKind::kRemoved) before = event.box;
       first = false;
     }
@@ -84,8 +87,12 @@ EventsByObject by_object(const RunEvents& run, std::size_t begin, std::size_t en
 class VisitJudge {
  public:
   VisitJudge(const RunEvents& run, const SceneTruth& truth, std::size_t visit)
-      : run_(run), truth_(truth), visit_(visit), begin_(truth.visit_begin[visit]),
-        end_(truth.visit_begin[visit + 1]), nets_(net_changes(run, begin_, end_)) {}
+      : run_(run),
+        truth_(truth),
+        visit_(visit),
+        begin_(truth.visit_begin[visit]),
+        end_(truth.visit_begin[visit + 1]),
+        nets_(net_changes(run, begin_, end_)) {}
 
   void judge(ObjectScore& score) {
     for (const SeenChange& seen : truth_.changes) {
@@ -101,7 +108,8 @@ class VisitJudge {
       return;
     }
     ObjectScore::Found found{seen, false, false, std::nullopt};
-    bool gone = !seen.change.before || !seen.old_place_frame, arrived = !seen.change.after || !seen.new_place_frame;
+    bool gone = !seen.change.before || !seen.old_place_frame,
+         arrived = !seen.change.after || !seen.new_place_frame;
     for (const NetChange& net : nets_) {
       gone = gone || says_gone(net, seen.change);
       arrived = arrived || says_new(net, seen.change);
@@ -115,8 +123,8 @@ class VisitJudge {
     score.changes.push_back(std::move(found));
   }
 
-  /// A thing within an object that holds several touching ones is removed or added by an UPDATED event
-  /// after which the object's box has lost or gained the thing's place.
+  /// A thing within an object that holds several touching ones is removed or added by an UPDATED
+  /// event after which the object's box has lost or gained the thing's place.
   void judge_parts(const TruthChange& change, ObjectScore::Found& found) const {
     if (found.exact || change.kind == ChangeKind::kMoved) return;
     for (const ObjectSnapshot& object : run_.objects_at_visit_begin[visit_]) {
@@ -206,7 +214,8 @@ double harmonic(double p, double r) {
 
 }  // namespace
 
-std::vector<NetChange> net_changes(const RunEvents& run, std::size_t first_frame, std::size_t end_frame) {
+std::vector<NetChange> net_changes(const RunEvents& run, std::size_t first_frame,
+                                   std::size_t end_frame) {
   std::vector<NetChange> nets;
   for (const auto& [id, events] : by_object(run, first_frame, end_frame)) {
     if (const auto net = net_of(events)) nets.push_back(*net);
@@ -253,7 +262,9 @@ double ObjectScore::recall(std::optional<ChangeKind> kind) const {
   return share(right, counted);
 }
 
-double ObjectScore::f1(std::optional<ChangeKind> kind) const { return harmonic(precision(kind), recall(kind)); }
+double ObjectScore::f1(std::optional<ChangeKind> kind) const {
+  return harmonic(precision(kind), recall(kind));
+}
 
 double ObjectScore::place_f1() const {
   std::size_t right = 0, counted = 0, found = 0;

@@ -39,8 +39,10 @@ void ObservedRegion::add(const Frame& frame) {
                                       8 * bz + i / (kSide * kSide) + 0.5);
           const Eigen::Vector3d p_C = T_C_W * (voxel * voxel_size_m_);
           if (p_C.z() < 0.05 || p_C.z() > max_depth_m_) continue;
-          const auto u = static_cast<int>(std::floor(p_C.x() / p_C.z() * camera.fx + camera.cx + 0.5));
-          const auto v = static_cast<int>(std::floor(p_C.y() / p_C.z() * camera.fy + camera.cy + 0.5));
+          const auto u =
+              static_cast<int>(std::floor(p_C.x() / p_C.z() * camera.fx + camera.cx + 0.5));
+          const auto v =
+              static_cast<int>(std::floor(p_C.y() / p_C.z() * camera.fy + camera.cy + 0.5));
           if (u < 0 || v < 0 || u >= camera.width || v >= camera.height) continue;
           const float depth = frame.depth_m.at<float>(v, u);
           if (!(depth > 0.0f) || depth < p_C.z() - margin_m_) continue;

@@ -6,7 +6,8 @@ namespace pocd {
 
 const Observations& Perception::observe(const Frame& frame) {
   const SegmentationConfig& segmentation = config_.segmentation;
-  organize(frame, segmentation.stride, config_.map.max_depth_m, config_.classes, classes_, pool_, cloud_);
+  organize(frame, segmentation.stride, config_.map.max_depth_m, config_.classes, classes_, pool_,
+           cloud_);
   segment_planes(cloud_, segmentation, config_.depth_noise, planes_);
   vote_planes(planes_, segmentation.majority_share, cloud_);
   ground_.update(planes_, segmentation, config_.depth_noise, cloud_);
@@ -15,7 +16,8 @@ const Observations& Perception::observe(const Frame& frame) {
   return observations_;
 }
 
-cv::Mat Perception::full_size_mask(const Frame& frame, const std::vector<std::uint8_t>& of_grid) const {
+cv::Mat Perception::full_size_mask(const Frame& frame,
+                                   const std::vector<std::uint8_t>& of_grid) const {
   cv::Mat mask(frame.camera.height, frame.camera.width, CV_8UC1);
   for (int v = 0; v < mask.rows; ++v) {
     std::uint8_t* row = mask.ptr<std::uint8_t>(v);

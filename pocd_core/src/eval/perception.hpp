@@ -1,5 +1,5 @@
-// The pipeline's own way from a frame to observations, for the baselines that need detections: what they
-// are compared by is the map keeping, not the segmentation.
+// The pipeline's own way from a frame to observations, for the baselines that need detections: what
+// they are compared by is the map keeping, not the segmentation.
 #pragma once
 
 #include "pocd/pipeline/pipeline_config.hpp"

@@ -33,7 +33,8 @@ double share_in_place(const OrientedBox& box, const OrientedBox& truth) {
 }
 
 bool same_place(const OrientedBox& box, const OrientedBox& truth) {
-  return footprint(box) <= kLargestFootprint * footprint(truth) && share_in_place(box, truth) >= kSameShare;
+  return footprint(box) <= kLargestFootprint * footprint(truth) &&
+         share_in_place(box, truth) >= kSameShare;
 }
 
 bool covers(const OrientedBox& box, const OrientedBox& truth) {

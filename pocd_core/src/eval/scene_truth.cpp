@@ -89,7 +89,8 @@ double part_distance(const ScenePart& part, const Eigen::Vector3d& p_P) {
 
 CameraModel reduced(const CameraModel& camera, double scale) {
   CameraModel out = camera;
-  out.width = static_cast<int>(camera.width * scale), out.height = static_cast<int>(camera.height * scale);
+  out.width = static_cast<int>(camera.width * scale),
+  out.height = static_cast<int>(camera.height * scale);
   out.fx = camera.fx * scale, out.fy = camera.fy * scale;
   out.cx = (camera.cx + 0.5) * scale - 0.5, out.cy = (camera.cy + 0.5) * scale - 0.5;
   return out;
@@ -116,9 +117,11 @@ double surface_distance(const Scene& scene, const Eigen::Vector3d& point_W, doub
   return best;
 }
 
-SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& options, ThreadPool* pool) {
+SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& options,
+                       ThreadPool* pool) {
   const std::size_t last = scenario.visits.size() - 1;
-  SceneTruth truth{{}, ObservedRegion(options.map_voxel_m, options.max_depth_m, kSeenMargin_m), {}, {}, {}};
+  SceneTruth truth{
+      {}, ObservedRegion(options.map_voxel_m, options.max_depth_m, kSeenMargin_m), {}, {}, {}};
   const auto final_scene =
       std::make_shared<Scene>(scene_at(scenario, last, std::numeric_limits<double>::infinity()));
   truth.surface.distance_m = [final_scene](const Eigen::Vector3d& p) {
@@ -164,7 +167,9 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
       look(frame, i, options.max_depth_m, Look::kThrough, places[c].before);
       look(frame, i, options.max_depth_m, Look::kHit, places[c].after);
     }
-    if (when.visit != last || when.robot_frame % static_cast<std::size_t>(options.frame_stride) != 0) continue;
+    if (when.visit != last ||
+        when.robot_frame % static_cast<std::size_t>(options.frame_stride) != 0)
+      continue;
     frame.camera = half;
     frame.depth_m = render(scene, half, frame.T_W_C, false, pool).depth_m;
     for (int n = 0; n < options.frame_stride; ++n) truth.observed.add(frame);

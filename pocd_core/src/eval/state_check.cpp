@@ -12,7 +12,8 @@ namespace {
 
 double nearest_listed_m(const ExpectedObject& thing, const Eigen::Vector3d& center_W) {
   double best = (thing.listed_W - center_W).norm();
-  for (const Eigen::Vector3d& earlier : thing.earlier_W) best = std::min(best, (earlier - center_W).norm());
+  for (const Eigen::Vector3d& earlier : thing.earlier_W)
+    best = std::min(best, (earlier - center_W).norm());
   return best;
 }
 
@@ -39,17 +40,18 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
   std::vector<AssignmentCandidate> pairs;
   for (std::size_t e = 0; e < expected.objects.size(); ++e) {
     for (std::size_t o = 0; o < objects.size(); ++o) {
-      const double cost = std::min(nearest_listed_m(expected.objects[e], objects[o].centroid_W),
-                                   box_distance_m(expected.objects[e], objects[o].box.pose.position_W));
+      const double cost =
+          std::min(nearest_listed_m(expected.objects[e], objects[o].centroid_W),
+                   box_distance_m(expected.objects[e], objects[o].box.pose.position_W));
       if (cost < kPairing_m) pairs.push_back({static_cast<int>(e), static_cast<int>(o), cost});
     }
   }
   std::vector<bool> expected_used(expected.objects.size()), object_used(objects.size());
   for (const AssignedPair& pair : assign(pairs, kPairing_m)) {
     const auto e = static_cast<std::size_t>(pair.row), o = static_cast<std::size_t>(pair.column);
-    verdict.matches.push_back({e, objects[o].id,
-                               nearest_listed_m(expected.objects[e], objects[o].centroid_W),
-                               box_distance_m(expected.objects[e], objects[o].box.pose.position_W)});
+    verdict.matches.push_back(
+        {e, objects[o].id, nearest_listed_m(expected.objects[e], objects[o].centroid_W),
+         box_distance_m(expected.objects[e], objects[o].box.pose.position_W)});
     expected_used[e] = object_used[o] = true;
   }
   for (std::size_t e = 0; e < expected.objects.size(); ++e) {
@@ -57,10 +59,11 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
   }
   for (std::size_t o = 0; o < objects.size(); ++o) {
     if (object_used[o]) continue;
-    const bool hidden = std::any_of(expected.hidden.begin(), expected.hidden.end(), [&](const auto& h) {
-      return std::min(nearest_listed_m(h, objects[o].centroid_W),
-                      box_distance_m(h, objects[o].box.pose.position_W)) <= tolerance_m;
-    });
+    const bool hidden =
+        std::any_of(expected.hidden.begin(), expected.hidden.end(), [&](const auto& h) {
+          return std::min(nearest_listed_m(h, objects[o].centroid_W),
+                          box_distance_m(h, objects[o].box.pose.position_W)) <= tolerance_m;
+        });
     (hidden ? verdict.kept_hidden : verdict.extra).push_back(objects[o].id);
   }
   verdict.ok_listed = verdict.ok_box = verdict.missing.empty() && verdict.extra.empty();
@@ -72,7 +75,8 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
 }
 
 StateRun run_states(const StateTruth& truth, const std::filesystem::path& folder,
-                    const PipelineConfig& config, const std::function<void(const StateRun&)>& done) {
+                    const PipelineConfig& config,
+                    const std::function<void(const StateRun&)>& done) {
   StateRun run;
   run.expected = expected_states(truth, folder);
   DatasetOptions options = state_dataset(truth, folder);
@@ -106,9 +110,10 @@ std::string describe_last_state(const StateRun& run) {
   for (const ObjectSnapshot& object : objects) {
     const Eigen::Vector3d& p = object.box.pose.position_W;
     const Eigen::Vector3d& s = object.box.size_m;
-    print(text, "  object %3u  centre %6.3f %6.3f %6.3f  yaw %6.1f deg  size %.3f %.3f %.3f  E[v] %.3f",
-          to_index(object.id), p.x(), p.y(), p.z(), object.box.pose.yaw_rad * 180.0 / M_PI, s.x(), s.y(),
-          s.z(), object.belief.stationarity());
+    print(text,
+          "  object %3u  centre %6.3f %6.3f %6.3f  yaw %6.1f deg  size %.3f %.3f %.3f  E[v] %.3f",
+          to_index(object.id), p.x(), p.y(), p.z(), object.box.pose.yaw_rad * 180.0 / M_PI, s.x(),
+          s.y(), s.z(), object.belief.stationarity());
     for (const StateMatch& match : verdict.matches) {
       if (match.object != object.id) continue;
       print(text, "  is thing %zu, %.3f m from listed, %.3f m from its box", match.expected,
@@ -127,9 +132,10 @@ std::string describe_last_state(const StateRun& run) {
     const Eigen::Vector3d& s = thing.box.size_m;
     const bool missing =
         std::find(verdict.missing.begin(), verdict.missing.end(), e) != verdict.missing.end();
-    print(text, "  thing  %3zu  listed %6.3f %6.3f %6.3f  box %6.3f %6.3f %6.3f  size %.3f %.3f %.3f%s\n",
-          e, thing.listed_W.x(), thing.listed_W.y(), thing.listed_W.z(), c.x(), c.y(), c.z(), s.x(), s.y(),
-          s.z(), missing ? "  MISSING" : "");
+    print(text,
+          "  thing  %3zu  listed %6.3f %6.3f %6.3f  box %6.3f %6.3f %6.3f  size %.3f %.3f %.3f%s\n",
+          e, thing.listed_W.x(), thing.listed_W.y(), thing.listed_W.z(), c.x(), c.y(), c.z(), s.x(),
+          s.y(), s.z(), missing ? "  MISSING" : "");
   }
   for (const ObjectEvent& event : run.events.back()) {
     const Eigen::Vector3d& p = event.box.pose.position_W;

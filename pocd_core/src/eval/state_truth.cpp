@@ -34,7 +34,8 @@ std::map<int, Instance> instances_of(const Frame& frame) {
       instance.mean_W += point_W;
     }
   }
-  for (auto& [id, instance] : instances) instance.mean_W /= static_cast<double>(instance.points_W.size());
+  for (auto& [id, instance] : instances)
+    instance.mean_W /= static_cast<double>(instance.points_W.size());
   return instances;
 }
 
@@ -76,7 +77,8 @@ Sight look_at(const Points& points_W, const Frame& frame) {
   return sight;
 }
 
-ExpectedState list_state(int state, const StateTruth& truth, const Frame& frame, std::vector<int>& ids) {
+ExpectedState list_state(int state, const StateTruth& truth, const Frame& frame,
+                         std::vector<int>& ids) {
   ExpectedState expected;
   expected.state = state;
   const std::map<int, Instance> instances = instances_of(frame);

@@ -1,6 +1,7 @@
-// The static-world baseline (Kimera in the paper's table): Voxblox's TSDF update, which knows no change.
-// A surface that is gone only fades as far as the running average forgets. The cap of the weight is
-// Voxblox's default of 10000, in effect none; the weight that a surface needs to count is tuned.
+// The static-world baseline (Kimera in the paper's table): Voxblox's TSDF update, which knows no
+// change. A surface that is gone only fades as far as the running average forgets. The cap of the
+// weight is Voxblox's default of 10000, in effect none; the weight that a surface needs to count is
+// tuned.
 #include "naive_tsdf.hpp"
 #include "pocd/eval/mapping_method.hpp"
 

@@ -1,10 +1,11 @@
-// Object submaps with consistency checks, after Schmid, Delmerico, Schonberger, Nieto, Pollefeys, Siegwart,
-// Cadena: "Panoptic Multi-TSDFs: a flexible representation for online multi-resolution volumetric mapping
-// and long-term dynamic scene consistency" (ICRA 2022). Each thing that is segmented gets a TSDF of its
-// own. While it is observed the submap is active; not observed for a while, it becomes inactive and is not
-// fused into any more. What is seen at its place on a later visit decides about it as a whole: matching
-// observations keep it (and the new submap made there is merged into it), conflicting ones discard it.
-// Background is one submap whose voxels are averaged over.
+// Object submaps with consistency checks, after Schmid, Delmerico, Schonberger, Nieto, Pollefeys,
+// Siegwart, Cadena: "Panoptic Multi-TSDFs: a flexible representation for online multi-resolution
+// volumetric mapping and long-term dynamic scene consistency" (ICRA 2022). Each thing that is
+// segmented gets a TSDF of its own. While it is observed the submap is active; not observed for a
+// while, it becomes inactive and is not fused into any more. What is seen at its place on a later
+// visit decides about it as a whole: matching observations keep it (and the new submap made there
+// is merged into it), conflicting ones discard it. Background is one submap whose voxels are
+// averaged over.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -17,13 +18,13 @@ namespace pocd {
 namespace {
 
 constexpr float kMaxWeight = 10000.0f, kMinWeight = 0.5f;
-constexpr int kInactiveAfterFrames = 15;   // one second
+constexpr int kInactiveAfterFrames = 15;  // one second
 constexpr int kConfirmFrames = 3;
-constexpr double kSameThing = 0.3;         // share of an observation that an active submap explains
+constexpr double kSameThing = 0.3;  // share of an observation that an active submap explains
 // Of the points that were compared; tuned for the best F1 of voxels on scenario 1-4, seed 7.
 constexpr double kConflictShare = 0.3;
 constexpr double kMatchShare = 0.5;
-constexpr double kComparedShare = 0.2;     // of a submap's points, before anything is decided
+constexpr double kComparedShare = 0.2;  // of a submap's points, before anything is decided
 
 struct Submap {
   explicit Submap(const PipelineConfig& config) : grid(config.map, kMaxWeight) {}
@@ -34,7 +35,8 @@ struct Submap {
   int frames = 0, missed = 0;
   bool active = true;
   ObjectSnapshot object;
-  /// Of an inactive submap: its surface and what later frames said of it (0 nothing, 1 match, 2 conflict).
+  /// Of an inactive submap: its surface and what later frames said of it (0 nothing, 1 match, 2
+  /// conflict).
   Points points_W;
   std::vector<std::uint8_t> said;
 };
@@ -50,7 +52,8 @@ class SubmapMethod final : public MappingMethod {
     const std::vector<Submap*> owner = assign_observations(observations);
     integrate(frame, observations, owner);
     for (auto& submap : submaps_) {
-      if (submap->active && submap->frames == kConfirmFrames && submap->missed == 0 && is_new(*submap)) {
+      if (submap->active && submap->frames == kConfirmFrames && submap->missed == 0 &&
+          is_new(*submap)) {
         report(EventKind::kAdded, *submap, frame, result);
       }
     }
@@ -107,19 +110,23 @@ class SubmapMethod final : public MappingMethod {
     std::size_t looked = 0, near = 0;
     for (std::size_t i = 0; i < observation.points.size(); i += step, ++looked) {
       float distance = 1.0f;
-      near += grid.distance_at(observation.points[i].point_W, 1e-6f, distance) && std::abs(distance) < 0.5f;
+      near += grid.distance_at(observation.points[i].point_W, 1e-6f, distance) &&
+              std::abs(distance) < 0.5f;
     }
     return looked > 0 ? static_cast<double>(near) / static_cast<double>(looked) : 0.0;
   }
 
-  void integrate(const Frame& frame, const Observations& observations, const std::vector<Submap*>& owner) {
+  void integrate(const Frame& frame, const Observations& observations,
+                 const std::vector<Submap*>& owner) {
     const OrganizedCloud& cloud = perception_.cloud();
     std::vector<std::uint8_t> use(cloud.size());
     const auto paint = [&](const Submap* submap) {
       for (std::size_t i = 0; i < cloud.size(); ++i) {
         const std::int32_t n = observations.observation_of[i];
-        const Submap* there = n == Observations::kNone ? nullptr : owner[static_cast<std::size_t>(n)];
-        const bool skip = cloud.kind[i] == PixelKind::kDynamic || cloud.kind[i] == PixelKind::kIgnore;
+        const Submap* there =
+            n == Observations::kNone ? nullptr : owner[static_cast<std::size_t>(n)];
+        const bool skip =
+            cloud.kind[i] == PixelKind::kDynamic || cloud.kind[i] == PixelKind::kIgnore;
         // Elsewhere the depth still shows free space in the submap's own blocks.
         use[i] = skip ? 0 : there == submap ? NaiveTsdf::kUse : NaiveTsdf::kUpdateOnly;
       }
@@ -155,8 +162,10 @@ class SubmapMethod final : public MappingMethod {
         const Eigen::Vector3d p_C = T_C_W * submap->points_W[i].cast<double>();
         std::uint8_t& said = submap->said[i];
         if (p_C.z() > 0.1 && p_C.z() < config_.map.max_depth_m) {
-          const auto u = static_cast<int>(std::floor(p_C.x() / p_C.z() * camera.fx + camera.cx + 0.5));
-          const auto v = static_cast<int>(std::floor(p_C.y() / p_C.z() * camera.fy + camera.cy + 0.5));
+          const auto u =
+              static_cast<int>(std::floor(p_C.x() / p_C.z() * camera.fx + camera.cx + 0.5));
+          const auto v =
+              static_cast<int>(std::floor(p_C.y() / p_C.z() * camera.fy + camera.cy + 0.5));
           if (u >= 0 && v >= 0 && u < camera.width && v < camera.height) {
             const double depth = frame.depth_m.at<float>(v, u);
             const double margin = config_.map.voxel_size_m * 2.0;
@@ -167,7 +176,9 @@ class SubmapMethod final : public MappingMethod {
         match += said == 1, conflict += said == 2;
       }
       const auto compared = static_cast<double>(match + conflict);
-      if (compared < kComparedShare * static_cast<double>(submap->points_W.size()) || compared < 10.0) continue;
+      if (compared < kComparedShare * static_cast<double>(submap->points_W.size()) ||
+          compared < 10.0)
+        continue;
       if (static_cast<double>(conflict) > kConflictShare * compared) {
         report(EventKind::kRemoved, *submap, frame, result);
         submap->frames = 0;
@@ -177,9 +188,10 @@ class SubmapMethod final : public MappingMethod {
   }
 
   void drop_discarded() {
-    submaps_.erase(std::remove_if(submaps_.begin(), submaps_.end(),
-                                  [](const auto& s) { return !s->active && s->frames < kConfirmFrames; }),
-                   submaps_.end());
+    submaps_.erase(
+        std::remove_if(submaps_.begin(), submaps_.end(),
+                       [](const auto& s) { return !s->active && s->frames < kConfirmFrames; }),
+        submaps_.end());
   }
 
   void deactivate() {
@@ -213,7 +225,8 @@ class SubmapMethod final : public MappingMethod {
     Submap* best = nullptr;
     double best_share = kMatchShare;
     for (const auto& other : submaps_) {
-      if (other->active || other.get() == &submap || other->class_id != submap.class_id || other->frames < kConfirmFrames) {
+      if (other->active || other.get() == &submap || other->class_id != submap.class_id ||
+          other->frames < kConfirmFrames) {
         continue;
       }
       std::size_t known = 0, near = 0;
@@ -223,8 +236,10 @@ class SubmapMethod final : public MappingMethod {
         ++known;
         near += std::abs(distance) < 0.5f;
       }
-      const bool enough = static_cast<double>(known) >= kComparedShare * static_cast<double>(submap.points_W.size());
-      const double share = known > 0 && enough ? static_cast<double>(near) / static_cast<double>(known) : 0.0;
+      const bool enough = static_cast<double>(known) >=
+                          kComparedShare * static_cast<double>(submap.points_W.size());
+      const double share =
+          known > 0 && enough ? static_cast<double>(near) / static_cast<double>(known) : 0.0;
       if (share > best_share) best_share = share, best = other.get();
     }
     return best;

@@ -1,8 +1,9 @@
-// Tracked dynamic objects, after Runz, Buffier, Agapito: "MaskFusion: real-time recognition, tracking and
-// reconstruction of multiple moving objects" (ISMAR 2018). Things of movable classes are never part of the
-// static map; each has a model of its own that is tracked by ICP from frame to frame and fused into. A
-// model that is not found for a while is given up, as there (its models are deactivated after ten frames
-// out of view); keep_lost leaves it where it was seen last, and takes it up again when it is found there.
+// Tracked dynamic objects, after Runz, Buffier, Agapito: "MaskFusion: real-time recognition,
+// tracking and reconstruction of multiple moving objects" (ISMAR 2018). Things of movable classes
+// are never part of the static map; each has a model of its own that is tracked by ICP from frame
+// to frame and fused into. A model that is not found for a while is given up, as there (its models
+// are deactivated after ten frames out of view); keep_lost leaves it where it was seen last, and
+// takes it up again when it is found there.
 #include <algorithm>
 
 #include "naive_tsdf.hpp"
@@ -31,7 +32,10 @@ struct Track {
 class TrackedObjectsMethod final : public MappingMethod {
  public:
   TrackedObjectsMethod(const PipelineConfig& config, bool keep_lost)
-      : config_(config), keep_lost_(keep_lost), perception_(config), background_(config.map, kMaxWeight) {}
+      : config_(config),
+        keep_lost_(keep_lost),
+        perception_(config),
+        background_(config.map, kMaxWeight) {}
 
   FrameResult process(const Frame& frame) override {
     const Observations& observations = perception_.observe(frame);
@@ -56,7 +60,8 @@ class TrackedObjectsMethod final : public MappingMethod {
 
  private:
   bool is_movable(ClassId id) const {
-    return config_.classes.role(id) == ClassRole::kObject && config_.classes.stationarity_class(id) == 0;
+    return config_.classes.role(id) == ClassRole::kObject &&
+           config_.classes.stationarity_class(id) == 0;
   }
 
   void integrate_background(const Frame& frame, const Observations& observations) {
@@ -83,9 +88,11 @@ class TrackedObjectsMethod final : public MappingMethod {
         if (tracks_[t].class_id != observation.class_id) continue;
         Pose& T_new_old = motion[t * movable.size() + m];
         double share = tracks_[t].model.explained_share(observation.points, radius_m, 300);
-        const bool near = (tracks_[t].box.pose.position_W - observation.box.pose.position_W).norm() <
-                          config_.association.max_distance_m;
-        if (share < 1.0 - config_.association.max_dissimilarity && near && tracks_[t].missed < kLostAfterFrames) {
+        const bool near =
+            (tracks_[t].box.pose.position_W - observation.box.pose.position_W).norm() <
+            config_.association.max_distance_m;
+        if (share < 1.0 - config_.association.max_dissimilarity && near &&
+            tracks_[t].missed < kLostAfterFrames) {
           const double aligned = align(tracks_[t], observation, T_new_old);
           if (aligned > share) {
             share = aligned;
@@ -93,7 +100,8 @@ class TrackedObjectsMethod final : public MappingMethod {
             T_new_old = Pose::Identity();
           }
         }
-        if (share > kOverlap) pairs.push_back({static_cast<int>(t), static_cast<int>(m), 1.0 - share});
+        if (share > kOverlap)
+          pairs.push_back({static_cast<int>(t), static_cast<int>(m), 1.0 - share});
       }
     }
     for (Track& track : tracks_) ++track.missed;
@@ -107,14 +115,18 @@ class TrackedObjectsMethod final : public MappingMethod {
     }
     for (std::size_t m = 0; m < movable.size(); ++m) {
       if (used[m]) continue;
-      tracks_.push_back({ObjectId{next_id_++}, observations.list[movable[m]].class_id,
-                         ObjectModel(config_.map.voxel_size_m), {}, 0});
+      tracks_.push_back({ObjectId{next_id_++},
+                         observations.list[movable[m]].class_id,
+                         ObjectModel(config_.map.voxel_size_m),
+                         {},
+                         0});
       fuse(tracks_.back(), observations.list[movable[m]]);
     }
     if (keep_lost_) return;
-    tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
-                                 [](const Track& track) { return track.missed > kLostAfterFrames; }),
-                  tracks_.end());
+    tracks_.erase(
+        std::remove_if(tracks_.begin(), tracks_.end(),
+                       [](const Track& track) { return track.missed > kLostAfterFrames; }),
+        tracks_.end());
   }
 
   /// Aligns the model with the observation; returns the share of the observation that then fits.
@@ -155,7 +167,8 @@ class TrackedObjectsMethod final : public MappingMethod {
 
 }  // namespace
 
-std::unique_ptr<MappingMethod> make_tracked_objects_method(const PipelineConfig& config, bool keep_lost) {
+std::unique_ptr<MappingMethod> make_tracked_objects_method(const PipelineConfig& config,
+                                                           bool keep_lost) {
   return std::make_unique<TrackedObjectsMethod>(config, keep_lost);
 }
 

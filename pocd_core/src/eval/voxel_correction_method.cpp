@@ -1,8 +1,8 @@
 // Voxel-level correction, after Fehr, Furrer, Dryanovski, Sturm, Gilitschenski, Siegwart, Cadena:
 // "TSDF-based change detection for consistent long-term dense reconstruction and dynamic object
-// discovery" (ICRA 2017): where a new observation contradicts the map, it wins, voxel by voxel; there
-// are no objects, so what is not seen again stays. Uses our own map, whose integration corrects a
-// contradicted voxel within a few frames whatever its weight.
+// discovery" (ICRA 2017): where a new observation contradicts the map, it wins, voxel by voxel;
+// there are no objects, so what is not seen again stays. Uses our own map, whose integration
+// corrects a contradicted voxel within a few frames whatever its weight.
 #include "pocd/eval/mapping_method.hpp"
 #include "pocd/eval/surface_points.hpp"
 

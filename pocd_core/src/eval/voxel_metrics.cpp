@@ -18,8 +18,9 @@ std::int32_t cell(double coordinate_m, double size_m) {
   return static_cast<std::int32_t>(std::floor(coordinate_m / size_m));
 }
 
-VoxelIndex voxel_of(const Eigen::Vector3d& p, double size_m) {
-  return {cell(p.x(), size_m), cell(p.y(), size_m), cell(p.z(), size_m)};
+VoxelIndex voxel_of(const Eigen::Vector3d& p, double size_m, double offset_m) {
+  return {cell(p.x() - offset_m, size_m), cell(p.y() - offset_m, size_m),
+          cell(p.z() - offset_m, size_m)};
 }
 
 bool within_heights(double z_m, const VoxelMetricsConfig& config) {
@@ -29,11 +30,14 @@ bool within_heights(double z_m, const VoxelMetricsConfig& config) {
 int ratio_of(const VoxelMetricsConfig& config) {
   const int ratio = static_cast<int>(std::lround(config.voxel_size_m / config.map_voxel_m));
   POCD_CHECK(ratio >= 1 && std::abs(ratio * config.map_voxel_m - config.voxel_size_m) < 1e-6);
+  const double shift = config.offset_m / config.map_voxel_m;
+  POCD_CHECK(std::abs(shift - std::round(shift)) < 1e-6);
   return ratio;
 }
 
 /// Voxels of which at least half was seen through in enough frames, floor and heights left out.
-std::vector<VoxelIndex> free_voxels(const ObservedRegion& observed, const VoxelMetricsConfig& config) {
+std::vector<VoxelIndex> free_voxels(const ObservedRegion& observed,
+                                    const VoxelMetricsConfig& config) {
   const int ratio = ratio_of(config);
   std::map<VoxelIndex, int> count;
   for (const ObservedRegion::Block& block : observed.blocks()) {
@@ -43,7 +47,8 @@ std::vector<VoxelIndex> free_voxels(const ObservedRegion& observed, const VoxelM
           Eigen::Vector3d(8 * block.key.x + i % 8 + 0.5, 8 * block.key.y + i / 8 % 8 + 0.5,
                           8 * block.key.z + i / 64 + 0.5) *
           config.map_voxel_m;
-      if (within_heights(center.z(), config)) ++count[voxel_of(center, config.voxel_size_m)];
+      if (within_heights(center.z(), config))
+        ++count[voxel_of(center, config.voxel_size_m, config.offset_m)];
     }
   }
   std::vector<VoxelIndex> voxels;
@@ -53,16 +58,18 @@ std::vector<VoxelIndex> free_voxels(const ObservedRegion& observed, const VoxelM
   return voxels;
 }
 
-/// Whether true surface lies within the tolerance of the voxel. The lattice is so fine that no surface
-/// within it is farther than the tolerance from a lattice point.
-bool near_truth(const VoxelIndex& voxel, const SurfaceTruth& truth, const VoxelMetricsConfig& config) {
+/// Whether true surface lies within the tolerance of the voxel. The lattice is so fine that no
+/// surface within it is farther than the tolerance from a lattice point.
+bool near_truth(const VoxelIndex& voxel, const SurfaceTruth& truth,
+                const VoxelMetricsConfig& config) {
   const int steps = static_cast<int>(std::ceil(config.voxel_size_m / config.tolerance_m));
   const double step_m = config.voxel_size_m / steps;
   for (int z = 0; z <= steps; ++z) {
     for (int y = 0; y <= steps; ++y) {
       for (int x = 0; x <= steps; ++x) {
         const Eigen::Vector3d p = Eigen::Vector3d(voxel.x, voxel.y, voxel.z) * config.voxel_size_m +
-                                  Eigen::Vector3d(x, y, z) * step_m;
+                                  Eigen::Vector3d(x, y, z) * step_m +
+                                  Eigen::Vector3d::Constant(config.offset_m);
         if (truth.distance_m(p) <= config.tolerance_m) return true;
       }
     }
@@ -70,36 +77,36 @@ bool near_truth(const VoxelIndex& voxel, const SurfaceTruth& truth, const VoxelM
   return false;
 }
 
-/// Counts each point in every voxel that it touches when the voxel is grown by the tolerance.
-std::map<VoxelIndex, int> grown_counts(const Points& points_W, const VoxelMetricsConfig& config) {
-  std::map<VoxelIndex, int> count;
-  const double t = config.tolerance_m, size = config.voxel_size_m;
+/// Voxels of the map that hold surface points, and all next to them.
+std::set<VoxelIndex> fine_neighbourhood(const Points& points_W, const VoxelMetricsConfig& config) {
+  std::set<VoxelIndex> fine;
   for (const Eigen::Vector3f& point : points_W) {
-    const Eigen::Vector3d p = point.cast<double>();
-    if (!within_heights(p.z(), config)) continue;
-    for (std::int32_t z = cell(p.z() - t, size); z <= cell(p.z() + t, size); ++z) {
-      for (std::int32_t y = cell(p.y() - t, size); y <= cell(p.y() + t, size); ++y) {
-        for (std::int32_t x = cell(p.x() - t, size); x <= cell(p.x() + t, size); ++x) {
-          ++count[{x, y, z}];
-        }
-      }
-    }
+    fine.insert(voxel_of(point.cast<double>(), config.map_voxel_m, 0.0));
   }
-  return count;
+  std::set<VoxelIndex> grown;
+  for (const VoxelIndex& v : fine) {
+    for (int n = 0; n < 27; ++n)
+      grown.insert({v.x + n % 3 - 1, v.y + n / 3 % 3 - 1, v.z + n / 9 - 1});
+  }
+  return grown;
 }
 
 }  // namespace
 
-double VoxelScore::precision() const { return percent(true_positives, true_positives + false_positives); }
+double VoxelScore::precision() const {
+  return percent(true_positives, true_positives + false_positives);
+}
 double VoxelScore::recall() const { return percent(recalled, recalled + false_negatives); }
 double VoxelScore::false_positive_rate() const {
   return percent(false_positives, false_positives + true_negatives);
 }
 
-std::map<VoxelIndex, int> occupied_voxels(const Points& points_W, const VoxelMetricsConfig& config) {
+std::map<VoxelIndex, int> occupied_voxels(const Points& points_W,
+                                          const VoxelMetricsConfig& config) {
   std::map<VoxelIndex, int> count;
   for (const Eigen::Vector3f& point : points_W) {
-    if (within_heights(point.z(), config)) ++count[voxel_of(point.cast<double>(), config.voxel_size_m)];
+    if (within_heights(point.z(), config))
+      ++count[voxel_of(point.cast<double>(), config.voxel_size_m, config.offset_m)];
   }
   for (auto it = count.begin(); it != count.end();) {
     it = it->second < config.min_points ? count.erase(it) : std::next(it);
@@ -108,7 +115,8 @@ std::map<VoxelIndex, int> occupied_voxels(const Points& points_W, const VoxelMet
 }
 
 VoxelScore score_against_reference(const Points& map_W, const Points& reference_W,
-                                   const ObservedRegion& observed, const VoxelMetricsConfig& config) {
+                                   const ObservedRegion& observed,
+                                   const VoxelMetricsConfig& config) {
   const auto map = occupied_voxels(map_W, config);
   const auto reference = occupied_voxels(reference_W, config);
   VoxelScore score;
@@ -134,7 +142,7 @@ VoxelScore score_against_truth(const Points& map_W, const SurfaceTruth& truth,
   VoxelScore score;
   Points judged;
   for (const Eigen::Vector3f& point : map_W) {
-    const VoxelIndex at = voxel_of(point.cast<double>(), config.map_voxel_m);
+    const VoxelIndex at = voxel_of(point.cast<double>(), config.map_voxel_m, 0.0);
     const ObservedRegion::Voxel voxel = observed.at(at.x, at.y, at.z);
     if (voxel.seen + voxel.seen_through >= config.min_frames) judged.push_back(point);
   }
@@ -149,19 +157,27 @@ VoxelScore score_against_truth(const Points& map_W, const SurfaceTruth& truth,
       false_positives.insert(voxel);
     }
   }
-  std::map<VoxelIndex, int> wanted;
+  struct Wanted {
+    int visible = 0, held = 0;
+  };
+  std::map<VoxelIndex, Wanted> wanted;
   const int ratio = ratio_of(config);
-  const auto down = [&](std::int32_t a) { return a >= 0 ? a / ratio : -((ratio - 1 - a) / ratio); };
+  const auto shift = static_cast<std::int32_t>(std::lround(config.offset_m / config.map_voxel_m));
+  const auto down = [&](std::int32_t a) {
+    const std::int32_t b = a - shift;
+    return b >= 0 ? b / ratio : -((ratio - 1 - b) / ratio);
+  };
+  const std::set<VoxelIndex> held = fine_neighbourhood(map_W, config);
   for (const VoxelIndex& fine : truth.visible) {
     if (!within_heights((fine.z + 0.5) * config.map_voxel_m, config)) continue;
-    ++wanted[{down(fine.x), down(fine.y), down(fine.z)}];
+    Wanted& voxel = wanted[{down(fine.x), down(fine.y), down(fine.z)}];
+    ++voxel.visible;
+    voxel.held += held.count(fine) > 0;
   }
-  const auto found = grown_counts(map_W, config);
   std::int64_t recalled = 0, missed = 0;
   for (const auto& [voxel, count] : wanted) {
-    if (count < config.min_points) continue;
-    const auto it = found.find(voxel);
-    if (it != found.end() && it->second >= config.min_points) {
+    if (count.visible < config.min_points) continue;
+    if (2 * count.held >= count.visible) {
       ++recalled;
     } else {
       ++missed;

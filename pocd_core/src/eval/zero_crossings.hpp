@@ -10,11 +10,11 @@
 
 namespace pocd {
 
-/// block_at(key) -> const Block* or null; value(block, index, v) -> whether the voxel is observed, with
-/// v = signed distance over truncation. Order: by block, voxel, axis.
+/// block_at(key) -> const Block* or null; value(block, index, v) -> whether the voxel is observed,
+/// with v = signed distance over truncation. Order: by block, voxel, axis.
 template <class Block, class BlockAt, class Value>
-Points zero_crossings(const std::vector<BlockKey>& keys, double voxel_size_m, const BlockAt& block_at,
-                      const Value& value) {
+Points zero_crossings(const std::vector<BlockKey>& keys, double voxel_size_m,
+                      const BlockAt& block_at, const Value& value) {
   constexpr int kSide = VoxelBlock::kSide;
   constexpr float kFree = 0.9f;
   constexpr std::array<int, 3> kStep{1, kSide, kSide * kSide};

@@ -1,4 +1,5 @@
-// The pipeline on real recordings whose truth is known. Skipped, saying so, where they are not there.
+// The pipeline on real recordings whose truth is known. Skipped, saying so, where they are not
+// there.
 #include <gtest/gtest.h>
 
 #include <filesystem>

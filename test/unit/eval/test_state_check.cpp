@@ -81,8 +81,7 @@ TEST(JudgeState, AHiddenThingMayBeHeldOrNot) {
 TEST(JudgeState, TheCentreSeenWhenLessWasHiddenCounts) {
   ExpectedState state = two_things();
   state.objects[0].earlier_W = {Eigen::Vector3d(0, 0, 0.02)};
-  const StateVerdict verdict =
-      judge_state({held(1, 0.3, 0, 0.1), held(2, 0, 0, 0.0)}, state, 0.05);
+  const StateVerdict verdict = judge_state({held(1, 0.3, 0, 0.1), held(2, 0, 0, 0.0)}, state, 0.05);
   EXPECT_TRUE(verdict.ok_listed);
 }
 

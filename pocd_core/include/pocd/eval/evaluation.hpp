@@ -24,8 +24,8 @@ struct EvaluationInput {
   std::string route;
   std::uint64_t seed = 1;
   std::unique_ptr<DatasetReader> reader;
-  /// Frame::sequence of the first frame of each visit, ascending, starting with 0. The last visit is
-  /// also mapped alone, as the paper's reference.
+  /// Frame::sequence of the first frame of each visit, ascending, starting with 0. The last visit
+  /// is also mapped alone, as the paper's reference.
   std::vector<std::uint64_t> visit_begin;
   std::shared_ptr<const SceneTruth> truth;  ///< null for recordings
   FaultOptions faults;

@@ -8,7 +8,8 @@
 
 namespace pocd {
 
-/// Means over runs (voxel shares and CPU), or counts put together (objects, calibration), of one method.
+/// Means over runs (voxel shares and CPU), or counts put together (objects, calibration), of one
+/// method.
 struct MethodSummary {
   std::string method;
   std::size_t runs = 0;
@@ -20,7 +21,8 @@ struct MethodSummary {
   double cpu_ms_per_frame = 0;
 };
 
-/// By method, in the order of the first run. Runs in which a share is undefined do not enter its mean.
+/// By method, in the order of the first run. Runs in which a share is undefined do not enter its
+/// mean.
 std::vector<MethodSummary> summarize(const std::vector<RunScore>& runs);
 
 /// Console table of the summaries.
@@ -31,13 +33,16 @@ void write_markdown(const std::vector<RunScore>& runs, const std::filesystem::pa
 void write_scores_csv(const std::vector<RunScore>& runs, const std::filesystem::path& file);
 void write_changes_csv(const std::vector<RunScore>& runs, const std::filesystem::path& file);
 /// Bins of the reliability curve by method.
-void write_calibration_csv(const std::vector<MethodSummary>& methods, const std::filesystem::path& file);
+void write_calibration_csv(const std::vector<MethodSummary>& methods,
+                           const std::filesystem::path& file);
 
 /// Bird's eye: green true, yellow missed, red false; the most serious of a column is shown.
 void draw_voxels(const VoxelScore& score, double voxel_size_m, const std::string& title,
                  const std::filesystem::path& file);
-/// E[v] over frames of up to eight objects: those with events REMOVED or MOVED first, then the longest.
-void draw_histories(const MethodScore& score, double remove_below, const std::filesystem::path& file);
+/// E[v] over frames of up to eight objects: those with events REMOVED or MOVED first, then the
+/// longest.
+void draw_histories(const MethodScore& score, double remove_below,
+                    const std::filesystem::path& file);
 /// Share that is true over predicted E[v].
 void draw_reliability(const Calibration& calibration, const std::string& title,
                       const std::filesystem::path& file);

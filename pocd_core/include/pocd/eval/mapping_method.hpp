@@ -11,8 +11,8 @@
 
 namespace pocd {
 
-/// One run of one method. Not thread-safe; works on the calling thread alone, so that its cost can be
-/// read from that thread's clock. Deterministic.
+/// One run of one method. Not thread-safe; works on the calling thread alone, so that its cost can
+/// be read from that thread's clock. Deterministic.
 class MappingMethod {
  public:
   virtual ~MappingMethod() = default;
@@ -31,8 +31,8 @@ class MappingMethod {
 /// The pipeline itself.
 std::unique_ptr<MappingMethod> make_pocd_method(const PipelineConfig& config);
 
-/// Static world: every depth image is averaged into one TSDF, as Voxblox and Kimera do (Oleynikova et
-/// al., IROS 2017; Rosinol et al., ICRA 2020).
+/// Static world: every depth image is averaged into one TSDF, as Voxblox and Kimera do (Oleynikova
+/// et al., IROS 2017; Rosinol et al., ICRA 2020).
 std::unique_ptr<MappingMethod> make_static_tsdf_method(const PipelineConfig& config);
 
 /// Tracked dynamic objects, after MaskFusion (Runz, Buffier, Agapito, ISMAR 2018).

@@ -39,13 +39,14 @@ struct ObjectScore {
   struct Found {
     SeenChange truth;
     bool exact = false;  ///< right kind and place
-    bool place = false;  ///< old place known to be empty and new place to be taken, however reported
+    bool place =
+        false;  ///< old place known to be empty and new place to be taken, however reported
     std::optional<std::size_t> exact_frame;  ///< when the events first said so
   };
   std::vector<Found> changes;  ///< those that could be seen
   std::vector<std::pair<NetChange, NetVerdict>> nets;
-  std::size_t unseen_changes = 0;     ///< true changes that no camera could see
-  std::size_t false_changes = 0;      ///< REMOVED and MOVED nets that are false
+  std::size_t unseen_changes = 0;  ///< true changes that no camera could see
+  std::size_t false_changes = 0;   ///< REMOVED and MOVED nets that are false
 
   /// Of exact kinds; index by ChangeKind, or all of them. NaN when undefined.
   double precision(std::optional<ChangeKind> kind = std::nullopt) const;
@@ -60,8 +61,10 @@ struct ObjectScore {
 /// Sum of several scores.
 ObjectScore merge(const std::vector<ObjectScore>& scores);
 
-/// Net changes of one visit, by object; REMOVED followed by a MOVED from the same place is that MOVED.
-std::vector<NetChange> net_changes(const RunEvents& run, std::size_t first_frame, std::size_t end_frame);
+/// Net changes of one visit, by object; REMOVED followed by a MOVED from the same place is that
+/// MOVED.
+std::vector<NetChange> net_changes(const RunEvents& run, std::size_t first_frame,
+                                   std::size_t end_frame);
 
 ObjectScore score_objects(const RunEvents& run, const SceneTruth& truth);
 

@@ -17,9 +17,9 @@ class ObservedRegion {
   ObservedRegion(double voxel_size_m, double max_depth_m, double margin_m)
       : voxel_size_m_(voxel_size_m), max_depth_m_(max_depth_m), margin_m_(margin_m) {}
 
-  /// A voxel counts as seen when its centre is in view and the pixel's depth is within the margin, as
-  /// seen through when the depth is farther by more. A return beyond the depth limit shows free space
-  /// up to the limit; no return shows nothing.
+  /// A voxel counts as seen when its centre is in view and the pixel's depth is within the margin,
+  /// as seen through when the depth is farther by more. A return beyond the depth limit shows free
+  /// space up to the limit; no return shows nothing.
   void add(const Frame& frame);
 
   struct Voxel {

@@ -12,18 +12,19 @@ namespace pocd {
 struct SceneTruthOptions {
   double map_voxel_m = 0.05;
   double max_depth_m = 3.0;
-  /// Of the frames of the last visit for the observed region and the visible surface; counts of the region
-  /// are multiplied by it.
+  /// Of the frames of the last visit for the observed region and the visible surface; counts of the
+  /// region are multiplied by it.
   int frame_stride = 3;
 };
 
-/// A change of the truth and when the robots could first see it clearly. Frames are numbers within the
-/// run, over all robots.
+/// A change of the truth and when the robots could first see it clearly. Frames are numbers within
+/// the run, over all robots.
 struct SeenChange {
   TruthChange change;
   std::size_t visit = 1;
-  /// First frame by which half of what the visit ever sees through the old place, or sees of the object
-  /// in its new place, has been seen; nothing when that is less than 10 sample points (0.1 m grid).
+  /// First frame by which half of what the visit ever sees through the old place, or sees of the
+  /// object in its new place, has been seen; nothing when that is less than 10 sample points (0.1 m
+  /// grid).
   std::optional<std::size_t> old_place_frame, new_place_frame;
 
   /// The frame by which a change can be known: for MOVED the later of the two that there are, since
@@ -41,7 +42,8 @@ struct SceneTruth {
   std::vector<std::size_t> visit_begin;
 };
 
-SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& options, ThreadPool* pool);
+SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& options,
+                       ThreadPool* pool);
 
 /// Distance of a point to the nearest surface of a part of the scene [m], at most `limit_m`.
 double surface_distance(const Scene& scene, const Eigen::Vector3d& point_W, double limit_m);

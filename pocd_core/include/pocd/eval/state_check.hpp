@@ -25,8 +25,8 @@ struct StateVerdict {
   std::vector<ObjectId> extra;
   /// Exactly the things that are there, centres within the tolerance of the listed ones.
   bool ok_listed = false;
-  /// The same by the centres of boxes: the listed centre is that of the visible surface, which lies up
-  /// to 6 cm from the centre of a box that is partly hidden.
+  /// The same by the centres of boxes: the listed centre is that of the visible surface, which lies
+  /// up to 6 cm from the centre of a box that is partly hidden.
   bool ok_box = false;
 };
 
@@ -40,7 +40,8 @@ struct StateRun {
   std::vector<std::vector<ObjectEvent>> events;      ///< during each state
 };
 
-/// Runs the pipeline over the folder and judges it after each state; `done`, if given, is called then.
+/// Runs the pipeline over the folder and judges it after each state; `done`, if given, is called
+/// then.
 StateRun run_states(const StateTruth& truth, const std::filesystem::path& folder,
                     const PipelineConfig& config,
                     const std::function<void(const StateRun&)>& done = nullptr);

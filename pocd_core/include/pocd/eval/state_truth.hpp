@@ -1,4 +1,5 @@
-// Truth of a data set that shows one table in several states: which things stand where in each state.
+// Truth of a data set that shows one table in several states: which things stand where in each
+// state.
 #pragma once
 
 #include <vector>
@@ -81,7 +82,8 @@ struct StateTruth {
   void describe(Visitor& visit) {
     visit.group("camera", camera, "Intrinsics.");
     visit.group("camera_pose", camera_pose, "Fixed pose of the camera.");
-    visit("tolerance_m", tolerance_m, Range{0.0, 10.0}, "Largest distance between two centres [m].");
+    visit("tolerance_m", tolerance_m, Range{0.0, 10.0},
+          "Largest distance between two centres [m].");
     visit("frames_per_state", frames_per_state, Range{1, 10000}, "How often each image is shown.");
     visit("objects", objects, "What stands where.");
   }
@@ -90,8 +92,8 @@ struct StateTruth {
 /// One thing of one state, with what its labelled pixels say.
 struct ExpectedObject {
   Eigen::Vector3d listed_W = Eigen::Vector3d::Zero();  ///< centre of the visible surface
-  OrientedBox box;     ///< around its labelled points
-  Points points_W;     ///< labelled points
+  OrientedBox box;                                     ///< around its labelled points
+  Points points_W;                                     ///< labelled points
   /// Other centres at which the thing may be held: those of earlier states, seen less hidden.
   std::vector<Eigen::Vector3d> earlier_W;
 };
@@ -99,8 +101,8 @@ struct ExpectedObject {
 struct ExpectedState {
   int state = 0;
   std::vector<ExpectedObject> objects;
-  /// Things of earlier states that nothing has contradicted since and that are hidden now: the library
-  /// may or may not hold them.
+  /// Things of earlier states that nothing has contradicted since and that are hidden now: the
+  /// library may or may not hold them.
   std::vector<ExpectedObject> hidden;
 };
 

@@ -1,0 +1,80 @@
+#include "pocd/eval/scene_truth.hpp"
+
+#include <gtest/gtest.h>
+
+#include "pocd/sim/sim_reader.hpp"
+
+namespace pocd {
+namespace {
+
+SceneObject box_object(const std::string& name, double x, double y) {
+  SceneObject object;
+  object.name = name;
+  object.class_id = 7;
+  object.T_W_O = upright_pose({x, y, 0}, 0.0);
+  ScenePart part;
+  part.size_m = {0.5, 0.5, 1.0};
+  part.T_O_P = upright_pose({0, 0, 0.5}, 0.0);
+  object.parts = {part};
+  return object;
+}
+
+/// A robot drives 4 m along x at y = 0; between two visits "near" goes away and "far" comes. "far"
+/// stands beside the end of the path, "never" where no camera sees it.
+Scenario two_visits() {
+  Scenario scenario;
+  scenario.name = "two visits";
+  scenario.camera = torwic_camera();
+  scenario.extrinsics = torwic_extrinsics();
+  scenario.fixtures = make_building({-6, -6}, {12, 6}, 3.0, 1, 0);
+  scenario.area_low_m = {-6, -6}, scenario.area_high_m = {12, 6};
+  SimRobot robot;
+  robot.name = "robot";
+  robot.path.waypoints_m = {{0, 0}, {4, 0}};
+  robot.path.closed = false;
+  robot.path.speed_m_s = 1.0;
+  scenario.robots = {robot};
+  scenario.visits = {{"before", {box_object("near", 2.5, 0.8), box_object("never", -3, 0)}},
+                     {"after", {box_object("far", 6, 0.8)}}};
+  return scenario;
+}
+
+TEST(SceneTruth, KnowsWhenAChangeIsInClearSight) {
+  const Scenario scenario = two_visits();
+  SceneTruthOptions options;
+  const SceneTruth truth = scene_truth(scenario, options, nullptr);
+  ASSERT_EQ(truth.visit_begin.size(), 3u);
+  ASSERT_EQ(truth.changes.size(), 3u);
+  const std::size_t begin = truth.visit_begin[1];
+  EXPECT_EQ(truth.changes[0].change.name, "near");
+  ASSERT_TRUE(truth.changes[0].clear_frame());
+  // 2.5 m ahead it is within the depth limit at once; its far side never faces the camera.
+  EXPECT_LT(*truth.changes[0].clear_frame(), begin + 15);
+  EXPECT_EQ(truth.changes[1].change.name, "never");
+  EXPECT_FALSE(truth.changes[1].clear_frame()) << "behind the robot all the time";
+  EXPECT_EQ(truth.changes[2].change.name, "far");
+  ASSERT_TRUE(truth.changes[2].clear_frame());
+  // Its near face is at 5.75 m: within 3 m once the camera is past 2.75 m, which takes over two
+  // seconds.
+  EXPECT_GT(*truth.changes[2].clear_frame(), begin + 30);
+}
+
+TEST(SceneTruth, SurfaceDistanceIsExactForABox) {
+  Scene scene;
+  scene.objects = {box_object("a", 0, 0)};
+  EXPECT_NEAR(surface_distance(scene, {0.5, 0, 0.5}, 9.0), 0.25, 1e-12);
+  EXPECT_NEAR(surface_distance(scene, {0, 0, 0.5}, 9.0), 0.25, 1e-12) << "inside";
+  EXPECT_NEAR(surface_distance(scene, {0.55, 0.65, 0.5}, 9.0), 0.5, 1e-12) << "an edge";
+  EXPECT_NEAR(surface_distance(scene, {9, 0, 0}, 1.0), 1.0, 1e-12) << "limited";
+}
+
+TEST(SceneTruth, VisibleSurfaceIsOfTheLastVisitAndNoFloor) {
+  const SceneTruth truth = scene_truth(two_visits(), SceneTruthOptions(), nullptr);
+  ASSERT_FALSE(truth.surface.visible.empty());
+  for (const VoxelIndex& voxel : truth.surface.visible) {
+    EXPECT_GE(voxel.x, 114) << "only the thing at x = 5.75 m and beyond";  // 0.05 m voxels
+  }
+}
+
+}  // namespace
+}  // namespace pocd
