@@ -2,12 +2,66 @@
 #include "apps/common.hpp"
 #include "pocd/config/dataset_options_cli.hpp"
 #include "pocd_dds/play/player.hpp"
+#include "pocd_dds/recording/replayer.hpp"
+
+namespace {
+
+using pocd::dds::ReplayOptions;
+
+/// Adds the flags that only concern recordings; all of them refuse to stand without FILE.
+void add_replay_options(CLI::App& app, ReplayOptions& replay, std::vector<std::string>& remap) {
+  CLI::Option* files =
+      app.add_option("FILE", replay.inputs, "Recordings to play: MCAP, .db3, or folders");
+  const auto add = [&](CLI::Option* option) {
+    option->needs(files)->group("Recordings");
+    return option;
+  };
+  add(app.add_option("--topics", replay.topics,
+                     "Pattern of topics to play; default: all; repeat it"))
+      ->allow_extra_args(false);
+  add(app.add_option("--remap", remap, "FROM=TO: play a topic under another name; repeat it"))
+      ->allow_extra_args(false);
+  add(app.add_option("--start", replay.start_s, "Seconds after the beginning to start at"))
+      ->check(CLI::Range(0.0, 1e9));
+  add(app.add_option("--duration", replay.duration_s, "Seconds of the recording to play"))
+      ->check(CLI::Range(0.0, 1e9));
+  add(app.add_flag("--loop", replay.loop, "Begin again at the end"));
+  add(app.add_option("--wait-for", replay.wait_for,
+                     "Pattern of topics whose readers are waited for; default: depth images"))
+      ->allow_extra_args(false);
+}
+
+/// Throws CLI::ValidationError.
+void set_remap(const std::vector<std::string>& remap, ReplayOptions& replay) {
+  for (const std::string& text : remap) {
+    const std::size_t at = text.find('=');
+    if (at == std::string::npos || at == 0 || at + 1 == text.size()) {
+      throw CLI::ValidationError("--remap", "\"" + text + "\" is not FROM=TO");
+    }
+    replay.remap[text.substr(0, at)] = text.substr(at + 1);
+  }
+}
+
+int replay_recordings(const ReplayOptions& options) {
+  pocd::dds::Replayer replayer(options);
+  const pocd::dds::ReplayResult result = replayer.run(pocd::dds::stop_requested);
+  std::cout << result.messages << " messages and " << result.instance_changes
+            << " instance changes sent, " << result.problems << " problems in the recording"
+            << (result.stopped ? ", stopped early" : "") << '\n';
+  if (!result.acknowledged) spdlog::error("readers did not acknowledge everything in time");
+  const bool good = (result.acknowledged || result.stopped) && result.failures == 0;
+  return std::cout.flush() && good ? 0 : 1;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Publishes a data set or the simulator on the bus, once its topics have readers.\n"
-      "Example: pocd_play --dataset sim --input config/sim/demo.yaml --speed 2\n"
-      "Topics per robot: rt/ROBOT/depth/image_raw, depth/camera_info, segmentation, "
+      "Publishes a data set, the simulator or a recording on the bus, once its topics have "
+      "readers.\n"
+      "Examples: pocd_play --dataset sim --input config/sim/demo.yaml --speed 2\n"
+      "          pocd_play run.mcap --rate 10 --topics '/robot_*' --topics '/tf*'\n"
+      "Topics per robot of a data set: rt/ROBOT/depth/image_raw, depth/camera_info, segmentation, "
       "color/image_raw, odom; and rt/tf_static.\n"
       "Exit code: 0 everything sent and acknowledged, 1 not, 2 usage.",
       "pocd_play");
@@ -17,6 +71,11 @@ int main(int argc, char** argv) {
   bool fast = false, no_wait = false;
   app.set_version_flag("--version", POCD_VERSION);
   pocd::add_dataset_options(app, options.dataset);
+  app.get_option("--dataset")->required(false);
+  app.get_option("--input")->required(false);
+  ReplayOptions replay;
+  std::vector<std::string> remap;
+  add_replay_options(app, replay, remap);
   app.add_option("--robot", options.robot, "Name of the robot, for sources that name none")
       ->capture_default_str();
   app.add_option("--speed", speed, "Multiple of the source's own speed")
@@ -38,6 +97,13 @@ int main(int argc, char** argv) {
   pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
   try {
     app.parse(argc, argv);
+    const bool has_dataset = app.count("--dataset") > 0 && app.count("--input") > 0;
+    if (has_dataset == !replay.inputs.empty()) {
+      throw CLI::ValidationError("give either --dataset and --input, or recordings");
+    }
+    set_remap(remap, replay);
+    // For recordings, --rate is the multiple of the original speed that it is with rosbag2.
+    if (!has_dataset && app.count("--rate") > 0) speed = options.dataset.frame_rate_hz;
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
@@ -53,6 +119,15 @@ int main(int argc, char** argv) {
       options.speed.reset();
     } else {
       options.speed = speed;
+    }
+    if (!replay.inputs.empty()) {
+      replay.bus = options.bus;
+      replay.speed = options.speed;
+      replay.lossless = options.lossless;
+      replay.clock = options.clock;
+      replay.wait_for_readers = options.wait_for_readers;
+      replay.keyboard = true;
+      return replay_recordings(replay);
     }
     pocd::dds::Player player(options);
     const pocd::dds::PlayResult result = player.run(pocd::dds::stop_requested);

@@ -120,7 +120,8 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   flow->period_ms = kMapPeriodMs;
   qos.flow_controllers().push_back(flow);
 
-  impl_->participant = factory->create_participant(options.domain, qos);
+  impl_->participant =
+      factory->create_participant(options.domain, qos, options.listener, StatusMask::none());
   if (impl_->participant == nullptr) {
     throw InputError("cannot join domain " + std::to_string(options.domain) +
                      ": Fast DDS made no participant (see its messages; is a network up?)");

@@ -16,6 +16,8 @@ struct BusOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd";
+  /// Hears of everything that is discovered, from the first moment; must outlive the participant.
+  eprosima::fastdds::dds::DomainParticipantListener* listener = nullptr;
 };
 
 /// ROS_DOMAIN_ID, or 0 when it is not set. Throws InputError when it is no domain.

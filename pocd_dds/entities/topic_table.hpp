@@ -58,6 +58,8 @@ inline constexpr TopicSpec kObjects{"pocd/objects", "pocd_msgs::msg::dds_::Objec
                                     Direction::kOut, true, latched(1, 20000)};
 inline constexpr TopicSpec kObjectEvents{"pocd/object_events", "pocd_msgs::msg::dds_::ObjectEvent_",
                                          Direction::kOut, false, reliable(1000)};
+inline constexpr TopicSpec kFrames{"pocd/frames", "pocd_msgs::msg::dds_::FrameRecord_",
+                                   Direction::kOut, false, reliable(1000)};
 inline constexpr TopicSpec kMapTiles{"pocd/map/tiles",
                                      "pocd_msgs::msg::dds_::MapTile_",
                                      Direction::kOut,

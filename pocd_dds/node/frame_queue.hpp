@@ -7,10 +7,19 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "pocd/input/frame.hpp"
 
 namespace pocd::dds {
+
+struct DroppedFrame {
+  std::string robot;
+  StampNs stamp_ns = 0;
+  bool with_segmentation = false, with_color = false;
+};
 
 /// Bounded. Thread-safe.
 class FrameQueue {
@@ -22,12 +31,20 @@ class FrameQueue {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (frames_.size() >= capacity_) {
+        Frame& oldest = frames_.front();
+        dropped_frames_.push_back(
+            {oldest.robot, oldest.stamp_ns, !oldest.labels.empty(), !oldest.color.empty()});
         frames_.pop_front();
         ++dropped_;
       }
       frames_.push_back(std::move(frame));
     }
     filled_.notify_one();
+  }
+  /// Those dropped since the last call.
+  std::vector<DroppedFrame> take_dropped() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::exchange(dropped_frames_, {});
   }
   /// Beyond the capacity, too: for the one who asked has_room(), and for the last frames of a run.
   void push(Frame frame) {
@@ -79,6 +96,7 @@ class FrameQueue {
   std::deque<Frame> frames_;
   bool closed_ = false;
   std::uint64_t dropped_ = 0;
+  std::vector<DroppedFrame> dropped_frames_;
 };
 
 }  // namespace pocd::dds

@@ -9,6 +9,7 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
+#include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 #include "pocd_dds/node/object_publication.hpp"
 #include "pocd_dds/node/visual_publication.hpp"
@@ -30,6 +31,7 @@ struct Node::Impl {
         participant(std::make_shared<Participant>(options.bus)),
         pipeline(config.pipeline),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
+        frames(participant, options.epoch),
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
         visuals(participant, config),
@@ -56,6 +58,7 @@ struct Node::Impl {
 
   // Guards everything below that the worker and run() both use.
   mutable std::mutex mutex;
+  FrameLog frames;
   ObjectPublication objects;
   MapPublication map;
   VisualPublication visuals;
@@ -107,6 +110,8 @@ void Node::Impl::process(const Frame& frame) {
     counts.last_warning = frame.robot + " frame " + std::to_string(frame.sequence) + ": " + warning;
     if (counts.warnings++ == 0) spdlog::warn("{} (more in diagnostics)", counts.last_warning);
   }
+  frames.processed(frame);
+  for (const DroppedFrame& dropped : queue.take_dropped()) frames.dropped(dropped);
   objects.add(result, frame.stamp_ns);
 }
 
@@ -122,7 +127,7 @@ void Node::Impl::send_status(const std::string& state) {
   counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
   busy_ms = 0.0;
   busy_frames = 0;
-  counts.write_failures = objects.failures() + map.failures();
+  counts.write_failures = objects.failures() + map.failures() + frames.failures();
   counts.map_bytes = map.bytes();
   counts.map_version = map.publisher().version();
   counts.objects = objects.objects().size();
@@ -142,7 +147,8 @@ bool Node::Impl::finish() {
       std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
   // A late subscriber that asked for a snapshot just now still gets it.
   map.answer_requests();
-  const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait);
+  const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait) &&
+                            frames.wait_acknowledged(wait);
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
   return acknowledged && counts.write_failures == 0;
 }

@@ -1,0 +1,320 @@
+#include "pocd_dds/recording/recorder.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <set>
+#include <thread>
+
+#include "pocd/common/check.hpp"
+#include "pocd_dds/entities/wakeup.hpp"
+#include "pocd_dds/recording/discovery.hpp"
+#include "pocd_dds/recording/record_queue.hpp"
+
+namespace pocd::dds {
+
+using namespace eprosima::fastdds::dds;  // NOLINT: this file is about nothing else
+using eprosima::fastrtps::types::ReturnCode_t;
+
+namespace {
+
+std::uint64_t nanoseconds(const eprosima::fastrtps::rtps::Time_t& time) {
+  const std::int64_t ns = time.to_ns();
+  return ns > 0 ? static_cast<std::uint64_t>(ns) : 0;
+}
+
+std::uint64_t now_ns() {
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                        std::chrono::system_clock::now().time_since_epoch())
+                                        .count());
+}
+
+struct Counts {
+  std::atomic<std::uint64_t> messages{0}, bytes{0}, lost{0};
+};
+
+/// One reader and the channels that its samples go to.
+class Tap : public DataReaderListener {
+ public:
+  Tap(RecordQueue& queue, Counts& counts, std::uint16_t channel,
+      std::optional<std::uint16_t> instances, bool keys_known)
+      : queue_(queue),
+        counts_(counts),
+        channel_(channel),
+        instances_(instances),
+        keys_known_(keys_known) {}
+
+  void on_data_available(DataReader* reader) override {
+    SampleInfo info;
+    while (true) {
+      if (sample_.payload.capacity() == 0) sample_.payload = queue_.buffer();
+      if (reader->take_next_sample(&sample_, &info) != ReturnCode_t::RETCODE_OK) return;
+      take(info);
+    }
+  }
+  void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
+    counts_.lost += static_cast<std::uint64_t>(status.total_count_change);
+  }
+
+ private:
+  void take(const SampleInfo& info) {
+    recording::MessageHeader header;
+    header.channel = channel_;
+    header.sequence = info.sample_identity.sequence_number().low;
+    header.log_time_ns = nanoseconds(info.reception_timestamp);
+    if (header.log_time_ns == 0) header.log_time_ns = now_ns();
+    header.publish_time_ns = nanoseconds(info.source_timestamp);
+    InstanceKey key{};
+    const eprosima::fastrtps::rtps::octet* handle = info.instance_handle.value;
+    std::copy_n(handle, key.size(), key.begin());
+    if (!info.valid_data) {
+      if (instances_) {
+        const bool disposed = info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
+        push_instance(header, disposed ? InstanceChange::kDisposed : InstanceChange::kUnregistered,
+                      key);
+      }
+      return;
+    }
+    if (instances_ && !keys_known_) push_instance(header, InstanceChange::kWritten, key);
+    ++counts_.messages;
+    counts_.bytes += sample_.payload.size();
+    queue_.push({header, std::move(sample_.payload)});
+    sample_.payload = {};
+  }
+
+  void push_instance(recording::MessageHeader header, InstanceChange change,
+                     const InstanceKey& key) {
+    header.channel = *instances_;
+    queue_.push({header, instance_payload(change, key)});
+  }
+
+  RecordQueue& queue_;
+  Counts& counts_;
+  const std::uint16_t channel_;
+  const std::optional<std::uint16_t> instances_;
+  const bool keys_known_;
+  RawSample sample_;
+};
+
+}  // namespace
+
+struct Recorder::Impl {
+  explicit Impl(const RecorderOptions& recorder_options)
+      : options(recorder_options),
+        queue(options.queue_bytes),
+        writer(options.output, options.split),
+        discovery([this] { wakeup.wake(); }) {
+    BusOptions bus = options.bus;
+    bus.listener = &discovery;
+    participant = std::make_shared<Participant>(bus);
+    thread = std::thread([this] { write_all(); });
+  }
+
+  ~Impl() {
+    close_readers();
+    queue.close();
+    if (thread.joinable()) thread.join();
+    participant->get()->set_listener(nullptr);
+  }
+
+  struct Line {
+    RecordedTopic topic;  // the weakest quality of service seen
+    std::uint16_t channel = 0;
+    std::optional<std::uint16_t> instances;
+    Subscriber* subscriber = nullptr;
+    DataReader* reader = nullptr;
+    std::unique_ptr<Tap> tap;
+  };
+
+  void consider(const RecordedTopic& topic);
+  std::uint16_t add_channel(const recording::SchemaText& schema, const std::string& name,
+                            const std::map<std::string, std::string>& metadata);
+  void open_reader(Line& line);
+  static void close_reader(Line& line);
+  void close_readers();
+  void write_all();
+  void rethrow_failure();
+
+  const RecorderOptions options;
+  Wakeup wakeup;
+  RecordQueue queue;
+  Counts counts;
+  mutable std::mutex writer_mutex;
+  recording::SplitWriter writer;
+  std::map<std::string, std::uint16_t> schemas;
+  std::exception_ptr failure;
+  std::atomic<bool> failed{false};
+
+  Discovery discovery;
+  std::shared_ptr<Participant> participant;
+  std::map<std::pair<std::string, std::vector<std::string>>, Line> lines;
+  std::set<std::string> refused;
+  std::thread thread;
+};
+
+void Recorder::Impl::consider(const RecordedTopic& topic) {
+  const auto matches = [&](const std::string& pattern) { return topic_matches(pattern, topic); };
+  if (!std::any_of(options.topics.begin(), options.topics.end(), matches) ||
+      std::any_of(options.exclude.begin(), options.exclude.end(), matches)) {
+    return;
+  }
+  const auto [entry, fresh] = lines.try_emplace({topic.name, topic.partitions});
+  Line& line = entry->second;
+  if (!fresh) {
+    // A reader that asks for more than one of the writers offers would not hear that one.
+    const bool weaker = (line.topic.reliable && !topic.reliable) ||
+                        (line.topic.transient_local && !topic.transient_local);
+    if (topic.type != line.topic.type || topic.keyed != line.topic.keyed) {
+      if (refused.insert(topic.name + " " + topic.type).second) {
+        spdlog::warn("{}: has a writer of another type, {}; it is not recorded", topic.name,
+                     topic.type);
+      }
+      return;
+    }
+    if (!weaker) return;
+    spdlog::warn("{}: has writers of different quality of service; recording with the weaker one",
+                 topic.name);
+    line.topic.reliable = line.topic.reliable && topic.reliable;
+    line.topic.transient_local = line.topic.transient_local && topic.transient_local;
+    close_reader(line);
+    open_reader(line);
+    return;
+  }
+  line.topic = topic;
+  const auto metadata = metadata_of(topic);
+  line.channel = add_channel(schema_of(topic), recorded_name(topic.name), metadata);
+  if (topic.keyed) {
+    line.instances = add_channel(
+        instances_schema(), instances_name(topic),
+        {{"instances_of", recorded_name(topic.name)}, {"partitions", metadata.at("partitions")}});
+  }
+  open_reader(line);
+  spdlog::info("recording {} ({})", recorded_name(topic.name), plain_type(topic.type));
+}
+
+std::uint16_t Recorder::Impl::add_channel(const recording::SchemaText& schema,
+                                          const std::string& name,
+                                          const std::map<std::string, std::string>& metadata) {
+  const std::lock_guard<std::mutex> lock(writer_mutex);
+  const auto known = schemas.find(schema.name);
+  const std::uint16_t id = known != schemas.end()
+                               ? known->second
+                               : writer.add_schema(schema.name, schema.encoding, schema.text);
+  schemas[schema.name] = id;
+  return writer.add_channel(id, name, "cdr", metadata);
+}
+
+void Recorder::Impl::open_reader(Line& line) {
+  const RecordedTopic& topic = line.topic;
+  try {
+    const KeyOf key = key_of(topic.type);
+    Topic* dds_topic =
+        participant->topic(topic.name, TypeSupport(new RawType(topic.type, topic.keyed, key)));
+    SubscriberQos subscriber_qos = SUBSCRIBER_QOS_DEFAULT;
+    for (const std::string& partition : topic.partitions) {
+      subscriber_qos.partition().push_back(partition.c_str());
+    }
+    line.subscriber = participant->get()->create_subscriber(subscriber_qos);
+    if (line.subscriber == nullptr) throw InputError("cannot create a subscriber");
+    // Taken as they come, so the history holds next to nothing; but it may not leave out anything.
+    Delivery delivery;
+    delivery.reliable = topic.reliable;
+    delivery.transient_local = topic.transient_local;
+    delivery.keep_last = 0;
+    DataReaderQos qos = participant->reader_qos(topic.name, delivery);
+    if (topic.exclusive) qos.ownership().kind = EXCLUSIVE_OWNERSHIP_QOS;
+    line.tap =
+        std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key));
+    line.reader = line.subscriber->create_datareader(dds_topic, qos, line.tap.get());
+    if (line.reader == nullptr) throw InputError("cannot create a reader");
+  } catch (const InputError& error) {
+    spdlog::error("{}: is not recorded: {}", topic.name, error.what());
+  }
+}
+
+void Recorder::Impl::close_reader(Line& line) {
+  if (line.reader != nullptr) {
+    line.reader->set_listener(nullptr);
+    line.subscriber->delete_datareader(line.reader);
+  }
+  if (line.subscriber != nullptr) {
+    const_cast<DomainParticipant*>(line.subscriber->get_participant())
+        ->delete_subscriber(line.subscriber);
+  }
+  line.reader = nullptr;
+  line.subscriber = nullptr;
+}
+
+void Recorder::Impl::close_readers() {
+  for (auto& [name, line] : lines) close_reader(line);
+}
+
+void Recorder::Impl::write_all() {
+  using Clock = std::chrono::steady_clock;
+  auto flushed = Clock::now();
+  const auto period = std::chrono::duration<double>(options.flush_period_s);
+  try {
+    while (!queue.finished()) {
+      std::optional<QueuedSample> sample = queue.pop(std::chrono::milliseconds(100));
+      const std::lock_guard<std::mutex> lock(writer_mutex);
+      if (sample) {
+        writer.write(sample->header, sample->payload.data(), sample->payload.size());
+        queue.give_back(std::move(sample->payload));
+      }
+      if (Clock::now() - flushed >= period) {
+        writer.flush();
+        flushed = Clock::now();
+      }
+    }
+    const std::lock_guard<std::mutex> lock(writer_mutex);
+    writer.close();
+  } catch (...) {
+    failure = std::current_exception();
+    failed = true;
+    wakeup.wake();
+  }
+}
+
+void Recorder::Impl::rethrow_failure() {
+  if (!failed) return;
+  if (thread.joinable()) thread.join();
+  std::rethrow_exception(failure);
+}
+
+Recorder::Recorder(const RecorderOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+Recorder::~Recorder() = default;
+
+void Recorder::step(std::chrono::milliseconds time) {
+  impl_->wakeup.wait_for(time);
+  impl_->rethrow_failure();
+  for (const RecordedTopic& topic : impl_->discovery.take()) impl_->consider(topic);
+}
+
+void Recorder::stop() {
+  impl_->close_readers();
+  impl_->queue.close();
+  if (impl_->thread.joinable()) impl_->thread.join();
+  impl_->rethrow_failure();
+}
+
+RecorderStatus Recorder::status() const {
+  RecorderStatus status;
+  status.messages = impl_->counts.messages;
+  status.bytes = impl_->counts.bytes;
+  status.lost = impl_->counts.lost;
+  status.dropped = impl_->queue.dropped();
+  status.waiting_bytes = impl_->queue.bytes();
+  status.topics = impl_->lines.size();
+  const std::lock_guard<std::mutex> lock(impl_->writer_mutex);
+  status.file_bytes = impl_->writer.bytes_written();
+  status.files = impl_->writer.files().size();
+  return status;
+}
+
+}  // namespace pocd::dds
