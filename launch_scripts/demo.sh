@@ -57,5 +57,5 @@ tail -n 1 "$output/pocd_mirror.log"
 echo
 pocd_demo_report --scenario "$scenario" --events "$output/events.csv" | tee "$output/report.txt"
 echo
-echo "picture of the map: $output/birdseye.png (objects from red, moves, to green, stays)"
+echo "picture of the map: $output/birdseye.png (objects from red, changing, to green, stationary)"
 echo "surface: $output/map.ply   events: $output/events.csv   logs: $output/*.log"
