@@ -1,0 +1,123 @@
+// What tests on the bus share: a domain of their own, waiting for a state, the commands.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "pocd_dds/entities/reader.hpp"
+#include "pocd_msgsPubSubTypes.h"
+#include "run_command.hpp"
+
+namespace pocd {
+
+/// A DDS domain that no other test uses, held by a lock on a file for as long as the object lives.
+class TestDomain {
+ public:
+  TestDomain() {
+    const auto folder = std::filesystem::temp_directory_path() / "pocd_test_domains";
+    std::filesystem::create_directories(folder);
+    for (number_ = 100; number_ < 200; ++number_) {
+      file_ = open((folder / std::to_string(number_)).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+      if (file_ >= 0 && flock(file_, LOCK_EX | LOCK_NB) == 0) return;
+      if (file_ >= 0) close(file_);
+    }
+    throw std::runtime_error("no free domain from 100 to 199");
+  }
+  ~TestDomain() { close(file_); }
+  TestDomain(const TestDomain&) = delete;
+  TestDomain& operator=(const TestDomain&) = delete;
+
+  int number() const { return number_; }
+  std::string text() const { return std::to_string(number_); }
+
+ private:
+  int number_ = 0;
+  int file_ = -1;
+};
+
+// Far more than anything takes; only a test that fails gets there.
+constexpr std::chrono::seconds kGenerous{120};
+
+/// Waits until the state is there. False: it never came.
+inline bool eventually(const std::function<bool()>& condition) {
+  const auto deadline = std::chrono::steady_clock::now() + kGenerous;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return true;
+}
+
+inline std::string bin(const std::string& name) { return std::string(POCD_BIN_DIR) + "/" + name; }
+inline std::string source(const std::string& path) {
+  return std::string(POCD_SOURCE_DIR) + "/" + path;
+}
+inline std::string scenario() { return source("test/integration/data/two_drives.yaml"); }
+
+/// pocd_node for robot1 with the simulator's classes.
+inline std::vector<std::string> node_command(const TestDomain& domain,
+                                             const std::vector<std::string>& more = {}) {
+  std::vector<std::string> command{bin("pocd_node"), "--config", source("config/simulated.yaml"),
+                                   "--robot",        "robot1",   "--domain",
+                                   domain.text()};
+  command.insert(command.end(), more.begin(), more.end());
+  return command;
+}
+
+/// pocd_play of the test's scenario, every frame acknowledged.
+inline std::vector<std::string> play_command(const TestDomain& domain,
+                                             const std::vector<std::string>& more = {}) {
+  std::vector<std::string> command{bin("pocd_play"), "--dataset", "sim",
+                                   "--input",        scenario(),  "--fast",
+                                   "--lossless",     "--domain",  domain.text()};
+  command.insert(command.end(), more.begin(), more.end());
+  return command;
+}
+
+/// The newest health of the node on a domain.
+class HealthWatch {
+ public:
+  explicit HealthWatch(const std::shared_ptr<dds::Participant>& participant)
+      : reader_(participant, dds::topics::kHealth, wakeup_) {}
+
+  /// Null as long as no node was heard.
+  const pocd_msgs::msg::NodeHealth* newest() {
+    pocd_msgs::msg::NodeHealth message;
+    dds::SampleMeta meta;
+    while (reader_.take(message, meta)) {
+      if (!meta.valid) continue;
+      newest_ = message;
+      heard_ = true;
+    }
+    return heard_ ? &newest_ : nullptr;
+  }
+  std::uint64_t problem(const std::string& topic, const std::string& reason) {
+    if (newest() == nullptr) return 0;
+    for (const auto& entry : newest_.problems()) {
+      if (entry.topic() == topic && entry.reason() == reason) return entry.count();
+    }
+    return 0;
+  }
+
+ private:
+  dds::Wakeup wakeup_;
+  dds::Reader<pocd_msgs::msg::NodeHealthPubSubType> reader_;
+  pocd_msgs::msg::NodeHealth newest_;
+  bool heard_ = false;
+};
+
+inline std::shared_ptr<dds::Participant> test_participant(const TestDomain& domain) {
+  return std::make_shared<dds::Participant>(dds::BusOptions{domain.number(), "", "pocd_test"});
+}
+
+}  // namespace pocd

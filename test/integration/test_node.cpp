@@ -1,0 +1,181 @@
+// pocd_node as a process: start, end, what it says about bad input.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bus_harness.hpp"
+#include "nav_msgsPubSubTypes.h"
+#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/entities/writer.hpp"
+#include "sensor_msgsPubSubTypes.h"
+
+namespace pocd {
+namespace {
+
+using dds::Delivery;
+constexpr Delivery kReliable{true, false, 100, 0, 0, false, 0};
+
+TEST(Node, EndsInOrderOnBothSignals) {
+  for (const int number : {SIGINT, SIGTERM}) {
+    const TestDomain domain;
+    HealthWatch health(test_participant(domain));
+    Process node(node_command(domain));
+    ASSERT_TRUE(eventually([&] { return health.newest() != nullptr; }));
+    EXPECT_EQ(health.newest()->message(), "running");
+    node.signal(number);
+    const CommandResult result = node.wait();
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    // The last state was acknowledged before the end, so it is here by now.
+    EXPECT_EQ(health.newest()->message(), "stopped");
+  }
+}
+
+TEST(Node, UsageErrorsAreOneLineAndExitCode2) {
+  const std::string config = source("config/simulated.yaml");
+  const std::vector<std::vector<std::string>> cases = {
+      {},
+      {"--config", "missing.yaml", "--robot", "r"},
+      {"--config", config, "--robot", "r", "--set", "node.queue_framez=3"},
+      {"--config", config, "--robot", "r", "--set", "node.queue_frames=0"},
+      {"--config", config, "--robot", "r", "--robot", "r"},
+      {"--config", config, "--robot", "r", "--domain", "500"},
+      {"--nonsense"}};
+  for (std::vector<std::string> arguments : cases) {
+    arguments.insert(arguments.begin(), bin("pocd_node"));
+    const CommandResult result = run_command(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.back() << result.err;
+    EXPECT_FALSE(result.err.empty()) << arguments.back();
+    EXPECT_EQ(result.out, "") << arguments.back();
+  }
+  EXPECT_NE(run_command({bin("pocd_node"), "--config", config, "--robot", "r", "--set",
+                         "node.queue_framez=3"})
+                .err.find("queue_frames"),
+            std::string::npos)
+      << "the likely intended key is named";
+}
+
+TEST(Commands, HelpShowsAnExample) {
+  for (const char* command : {"pocd_node", "pocd_play", "pocd_mirror"}) {
+    const CommandResult result = run_command({bin(command), "--help"});
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_NE(result.out.find("Example"), std::string::npos) << command;
+    EXPECT_NE(result.out.find(std::string(command) + " --"), std::string::npos) << command;
+  }
+}
+
+/// A sender of one robot's messages that does not care whether they are good.
+class Sender {
+ public:
+  explicit Sender(const std::shared_ptr<dds::Participant>& bus)
+      : depth(bus, dds::topics::kDepth, "rt/robot1/depth/image_raw", kReliable),
+        info(bus, dds::topics::kCameraInfo, "rt/robot1/depth/camera_info", kReliable),
+        labels(bus, dds::topics::kSegmentation, "rt/robot1/segmentation", kReliable),
+        odometry(bus, dds::topics::kOdometry, "rt/robot1/odom", kReliable) {}
+
+  sensor_msgs::msg::Image image(StampNs stamp_ns) const {
+    return dds::image_message(cv::Mat(20, 30, CV_16UC1, cv::Scalar(1500)), "16UC1", stamp_ns,
+                              "camera");
+  }
+  dds::Writer<sensor_msgs::msg::ImagePubSubType> depth;
+  dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info;
+  dds::Writer<sensor_msgs::msg::ImagePubSubType> labels;
+  dds::Writer<nav_msgs::msg::OdometryPubSubType> odometry;
+};
+
+TEST(Node, CountsBadInputByReasonAndStaysUp) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  Sender sender(bus);
+  // Reliable readers, so that what is counted does not depend on luck.
+  Process node(node_command(domain, {"--lossless"}));
+  ASSERT_TRUE(eventually([&] {
+    return health.newest() != nullptr && sender.depth.matched() > 0 && sender.info.matched() > 0 &&
+           sender.labels.matched() > 0 && sender.odometry.matched() > 0;
+  }));
+
+  StampNs stamp_ns = 1'000'000'000;
+  const auto bad_image = [&](auto& writer, auto change) {
+    auto message = sender.image(stamp_ns += 1'000'000);
+    change(message);
+    EXPECT_TRUE(writer.write(message));
+  };
+  using Image = sensor_msgs::msg::Image;
+  bad_image(sender.depth, [](Image& m) { m.encoding("mono7"); });
+  bad_image(sender.depth, [](Image& m) { m.encoding("mono7"); });
+  bad_image(sender.depth, [](Image& m) { m.data().resize(100); });
+  bad_image(sender.depth, [](Image& m) { m.step(3); });
+  bad_image(sender.depth, [](Image& m) { m.width(0); });
+  bad_image(sender.labels, [](Image& m) { m.encoding("jpeg"); });
+
+  auto info = dds::camera_message({30, 20, 0, 40, 15, 10}, stamp_ns, "camera");
+  sender.info.write(info);
+  const auto bad_pose = [&](auto change) {
+    auto message = dds::odometry_message({"map", "base", stamp_ns += 1'000'000, PoseQuaternion{}});
+    change(message);
+    EXPECT_TRUE(sender.odometry.write(message));
+  };
+  using Odometry = nav_msgs::msg::Odometry;
+  bad_pose([](Odometry& m) { m.pose().pose().position().x(std::nan("")); });
+  bad_pose([](Odometry& m) { m.pose().pose().orientation().w(0.5); });
+  bad_pose([](Odometry&) {});
+  bad_pose([](Odometry& m) { m.header().stamp().sec(0); });
+
+  auto good = sender.image(stamp_ns += 1'000'000);
+  sender.depth.write(good);
+  auto again = sender.image(stamp_ns - 5'000'000);
+  sender.depth.write(again);
+
+  const std::string depth = "rt/robot1/depth/image_raw", odometry = "rt/robot1/odom";
+  EXPECT_TRUE(eventually([&] { return health.problem(depth, "stamp_backwards") == 1; }));
+  EXPECT_TRUE(eventually([&] { return health.problem(odometry, "stamp_backwards") == 1; }));
+  EXPECT_EQ(health.problem(depth, "unknown_encoding"), 2u);
+  EXPECT_EQ(health.problem(depth, "data_size"), 1u);
+  EXPECT_EQ(health.problem(depth, "step_too_small"), 1u);
+  EXPECT_EQ(health.problem(depth, "empty_image"), 1u);
+  EXPECT_EQ(health.problem("rt/robot1/segmentation", "unknown_encoding"), 1u);
+  EXPECT_EQ(health.problem("rt/robot1/depth/camera_info", "zero_focal_length"), 1u);
+  EXPECT_EQ(health.problem(odometry, "not_finite"), 1u);
+  EXPECT_EQ(health.problem(odometry, "non_unit_quaternion"), 1u);
+  EXPECT_EQ(health.newest()->level(), 1) << "a warning";
+  // The good image lacks its camera info, and the node says so.
+  EXPECT_TRUE(eventually([&] {
+    return !health.newest()->robots().empty() &&
+           health.newest()->robots()[0].waiting_for().find("waiting for camera_info") == 0;
+  }));
+
+  node.signal(SIGTERM);
+  const CommandResult result = node.wait();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  std::size_t lines = 0;
+  for (std::size_t at = 0;
+       (at = result.err.find("unknown_encoding: encoding \"mono7\"", at)) != std::string::npos;
+       ++at) {
+    ++lines;
+  }
+  EXPECT_EQ(lines, 1u) << "two bad images are logged once";
+}
+
+TEST(Node, OperatorsProfileReplacesTheTable) {
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "profiles.xml";
+  std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <data_writer profile_name="pocd/health"><qos><reliability><kind>BEST_EFFORT</kind></reliability>
+  </qos></data_writer></profiles>)";
+  const auto bus = test_participant(domain);
+  dds::Wakeup wakeup;
+  dds::Reader<pocd_msgs::msg::NodeHealthPubSubType> reader(bus, dds::topics::kHealth, wakeup);
+  Process node(node_command(domain, {"--profiles", file.string()}));
+  // A reliable reader does not match the best-effort writer that the profile asks for.
+  EXPECT_TRUE(eventually([&] { return reader.incompatible() > 0; }));
+  EXPECT_EQ(reader.matched(), 0);
+  node.signal(SIGINT);
+  EXPECT_EQ(node.wait().exit_code, 0);
+  std::ofstream(file) << "<profiles><nonsense/></profiles>";
+  EXPECT_NE(run_command(node_command(domain, {"--profiles", file.string()})).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace pocd
