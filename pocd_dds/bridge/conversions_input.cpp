@@ -1,5 +1,6 @@
+#include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <cstdio>
 #include <opencv2/imgproc.hpp>
 
 #include "pocd/common/check.hpp"
@@ -41,11 +42,14 @@ std::optional<InputProblem> layout_problem(const sensor_msgs::msg::Image& image,
 }
 
 cv::Mat copy_of(const sensor_msgs::msg::Image& image, int type) {
-  // OpenCV has no view of constant data; the clone is what leaves this function.
-  auto* data = const_cast<std::uint8_t*>(image.data().data());
-  return cv::Mat(static_cast<int>(image.height()), static_cast<int>(image.width()), type, data,
-                 image.step())
-      .clone();
+  cv::Mat copy(static_cast<int>(image.height()), static_cast<int>(image.width()), type);
+  // Row by row: a step need not be a multiple of a pixel's size, which OpenCV's views insist on.
+  const std::size_t row_bytes = image.width() * copy.elemSize();
+  for (int row = 0; row < copy.rows; ++row) {
+    std::copy_n(image.data().data() + std::size_t{image.step()} * row, row_bytes,
+                copy.ptr<std::uint8_t>(row));
+  }
+  return copy;
 }
 
 Checked<cv::Mat> image_from(const sensor_msgs::msg::Image& image, int type) {
