@@ -1,0 +1,115 @@
+// A camera that sways before a room, the pipeline behind it, and what it said.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "pocd/pipeline/pocd_pipeline.hpp"
+#include "test_room.hpp"
+
+namespace pocd::test {
+
+class Drive {
+ public:
+  explicit Drive(const PipelineConfig& config = room_config()) : config_(config), pipeline_(config) {}
+
+  /// Next frame of the drive, with noise, of this scene.
+  Frame next_frame(const Scene& scene) {
+    Frame frame = shoot(scene, swaying_camera(count_), count_);
+    add_noise(frame, config_.depth_noise, 3);
+    ++count_;
+    return frame;
+  }
+
+  FrameResult process(const Frame& frame) {
+    FrameResult result = pipeline_.process_frame(frame);
+    events_.insert(events_.end(), result.events.begin(), result.events.end());
+    return result;
+  }
+
+  void watch(const Scene& scene, int frames) {
+    for (int i = 0; i < frames; ++i) process(next_frame(scene));
+  }
+
+  /// Watches until there is an event of this kind; the number of frames it took, or -1.
+  int watch_for(EventKind kind, const Scene& scene, int frames) {
+    const std::size_t before = of_kind(kind).size();
+    for (int i = 1; i <= frames; ++i) {
+      process(next_frame(scene));
+      if (of_kind(kind).size() > before) return i;
+    }
+    return -1;
+  }
+
+  std::vector<ObjectEvent> of_kind(EventKind kind) const {
+    std::vector<ObjectEvent> list;
+    std::copy_if(events_.begin(), events_.end(), std::back_inserter(list),
+                 [&](const ObjectEvent& e) { return e.kind == kind; });
+    return list;
+  }
+
+  /// The confirmed object nearest to a place, if any lies within 0.4 m (seen from above).
+  std::optional<ObjectSnapshot> object_at(double x, double y) const {
+    std::optional<ObjectSnapshot> best;
+    double best_m = 0.4;
+    for (const ObjectSnapshot& o : pipeline_.objects()) {
+      const double d = (o.box.pose.position_W.head<2>() - Eigen::Vector2d(x, y)).norm();
+      if (d < best_m) best_m = d, best = o;
+    }
+    return best;
+  }
+
+  std::size_t voxels_of(ObjectId id) const {
+    std::size_t count = 0;
+    for_each_voxel([&](const Eigen::Vector3d&, std::int16_t, std::uint16_t, std::uint32_t owner) {
+      count += owner == to_index(id);
+    });
+    return count;
+  }
+
+  /// Known voxels at or behind a surface whose centres lie in this box of the map frame.
+  std::size_t solid_voxels_in(const Eigen::Vector3d& low_W, const Eigen::Vector3d& high_W) const {
+    std::size_t count = 0;
+    for_each_voxel([&](const Eigen::Vector3d& p, std::int16_t tsdf, std::uint16_t weight, std::uint32_t) {
+      count += weight > 0 && tsdf <= 0 && (p.array() > low_W.array()).all() && (p.array() < high_W.array()).all();
+    });
+    return count;
+  }
+
+  PocdPipeline& pipeline() { return pipeline_; }
+  const std::vector<ObjectEvent>& events() const { return events_; }
+  std::uint64_t frames() const { return count_; }
+
+ private:
+  template <class Visit>
+  void for_each_voxel(const Visit& visit) const {
+    const TsdfMap& map = pipeline_.map();
+    for (const BlockKey& key : map.sorted_keys()) {
+      const VoxelBlock& block = *map.find(key);
+      for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
+        const Eigen::Vector3d index(8 * key.x + i % 8, 8 * key.y + i / 8 % 8, 8 * key.z + i / 64);
+        visit((index.array() + 0.5) * config_.map.voxel_size_m, block.tsdf[i], block.weight[i], block.owner[i]);
+      }
+    }
+  }
+
+  PipelineConfig config_;
+  PocdPipeline pipeline_;
+  std::vector<ObjectEvent> events_;
+  std::uint64_t count_ = 0;
+};
+
+/// For messages of failed expectations.
+inline std::string text(const std::vector<ObjectEvent>& events) {
+  std::string out;
+  for (const ObjectEvent& e : events) {
+    out += std::string(to_string(e.kind)) + " " + std::to_string(to_index(e.object)) + " in frame " +
+           std::to_string(e.frame_sequence) + " by " + e.evidence.rule + "\n";
+  }
+  return out;
+}
+
+}  // namespace pocd::test

@@ -1,0 +1,186 @@
+// What the pipeline says when something changed, and what the map holds then.
+#include <gtest/gtest.h>
+
+#include "drive.hpp"
+
+namespace pocd {
+namespace {
+
+using test::Drive;
+using test::kBoxClass;
+using test::kCageClass;
+using test::room_with;
+using test::solid;
+using test::text;
+
+const Eigen::Vector3d kSize(0.6, 0.4, 0.6);
+constexpr int kLearn = 25;  // frames: more than half of the sway, so that sides are seen
+/// Within a second of a camera at 15 Hz a change in full view must be reported.
+constexpr int kPromptly = 15;
+
+SceneObject left_box() { return solid(kBoxClass, {-0.6, 2.3}, kSize); }
+SceneObject right_cage() { return solid(kCageClass, {0.7, 2.4}, {0.5, 0.5, 0.8}, 0.3); }
+
+TEST(PipelineChanges, ThingsAreAddedOnceWithTheirClassAndPlace) {
+  Drive drive;
+  drive.watch(room_with({left_box(), right_cage()}), kLearn);
+  const auto added = drive.of_kind(EventKind::kAdded);
+  ASSERT_EQ(added.size(), 2u) << text(drive.events());
+  const auto box = drive.object_at(-0.6, 2.3);
+  const auto cage = drive.object_at(0.7, 2.4);
+  ASSERT_TRUE(box && cage);
+  EXPECT_EQ(box->class_id, kBoxClass);
+  EXPECT_EQ(cage->class_id, kCageClass);
+  EXPECT_LT((box->box.pose.position_W - Eigen::Vector3d(-0.6, 2.3, 0.3)).norm(), 0.08);
+  EXPECT_NEAR(box->box.size_m.z(), 0.6, 0.08) << "it stands on the floor";
+  EXPECT_GT(box->belief.stationarity(), 0.67) << "seen in place, it is trusted more than at first";
+  EXPECT_GT(drive.voxels_of(box->id), 100u);
+  for (const ObjectEvent& e : added) EXPECT_GE(e.frame_sequence, 2u) << "not on first sight";
+}
+
+TEST(PipelineChanges, SequenceNumbersHaveNoGaps) {
+  Drive drive;
+  drive.watch(room_with({left_box(), right_cage()}), kLearn);
+  drive.watch(room_with({right_cage()}), kLearn);
+  ASSERT_GE(drive.events().size(), 3u);
+  for (std::size_t i = 0; i < drive.events().size(); ++i) EXPECT_EQ(drive.events()[i].sequence, i + 1);
+}
+
+TEST(PipelineChanges, RemovedBoxIsReportedAndItsVoxelsAreGone) {
+  Drive drive;
+  drive.watch(room_with({left_box(), right_cage()}), kLearn);
+  const auto box = drive.object_at(-0.6, 2.3);
+  const auto cage = drive.object_at(0.7, 2.4);
+  ASSERT_TRUE(box && cage);
+  const std::size_t cage_voxels = drive.voxels_of(cage->id);
+  ASSERT_GT(drive.voxels_of(box->id), 100u);
+
+  const int frames = drive.watch_for(EventKind::kRemoved, room_with({right_cage()}), kPromptly);
+  ASSERT_GT(frames, 0) << text(drive.events());
+  const ObjectEvent removed = drive.of_kind(EventKind::kRemoved)[0];
+  EXPECT_EQ(removed.object, box->id);
+  EXPECT_EQ(removed.class_id, kBoxClass);
+  EXPECT_FALSE(removed.previous_box);
+  EXPECT_LT((removed.box.pose.position_W - box->box.pose.position_W).norm(), 0.05);
+  EXPECT_GT(removed.evidence.seen_through_share, 0.5);
+  // Exactly its voxels: none of it is left at once, and its neighbour has all of its own.
+  EXPECT_EQ(drive.voxels_of(box->id), 0u);
+  EXPECT_GE(drive.voxels_of(cage->id), cage_voxels);
+  EXPECT_FALSE(drive.object_at(-0.6, 2.3));
+  // And nothing solid is where it was, two voxels above the floor and 4 cm inside of its sides.
+  drive.watch(room_with({right_cage()}), 5);
+  EXPECT_EQ(drive.solid_voxels_in({-0.86, 2.14, 0.1}, {-0.34, 2.46, 0.56}), 0u);
+  EXPECT_TRUE(drive.object_at(0.7, 2.4));
+}
+
+TEST(PipelineChanges, RetiredIdsAreThoseOfRemovedObjects) {
+  Drive drive;
+  drive.watch(room_with({left_box()}), kLearn);
+  const auto box = drive.object_at(-0.6, 2.3);
+  ASSERT_TRUE(box);
+  for (int i = 0; i < kPromptly; ++i) {
+    const FrameResult result = drive.process(drive.next_frame(room_with({})));
+    if (result.retired.empty()) continue;
+    EXPECT_EQ(result.retired, std::vector<ObjectId>{box->id});
+    ASSERT_EQ(result.events.size(), 1u);
+    EXPECT_EQ(result.events[0].kind, EventKind::kRemoved);
+    for (const auto& changed : result.changed_objects) EXPECT_NE(changed.id, box->id);
+    return;
+  }
+  FAIL() << text(drive.events());
+}
+
+TEST(PipelineChanges, MovedBoxKeepsItsIdentityAndNamesBothPlaces) {
+  Drive drive;
+  drive.watch(room_with({left_box(), right_cage()}), kLearn);
+  const auto box = drive.object_at(-0.6, 2.3);
+  ASSERT_TRUE(box);
+  // 35 cm: the old and the new place overlap.
+  const Scene after = room_with({solid(kBoxClass, {-0.25, 2.2}, kSize), right_cage()});
+  const int frames = drive.watch_for(EventKind::kMoved, after, 2 * kPromptly);
+  ASSERT_GT(frames, 0) << text(drive.events());
+  drive.watch(after, 10);
+  const auto moved = drive.of_kind(EventKind::kMoved);
+  ASSERT_EQ(moved.size(), 1u) << text(drive.events());
+  EXPECT_EQ(moved[0].object, box->id);
+  ASSERT_TRUE(moved[0].previous_box);
+  EXPECT_LT((moved[0].previous_box->pose.position_W - Eigen::Vector3d(-0.6, 2.3, 0.3)).norm(), 0.1);
+  EXPECT_LT((moved[0].box.pose.position_W - Eigen::Vector3d(-0.25, 2.2, 0.3)).norm(), 0.15);
+  EXPECT_TRUE(drive.of_kind(EventKind::kRemoved).empty()) << text(drive.events());
+  const auto now = drive.object_at(-0.25, 2.2);
+  ASSERT_TRUE(now);
+  EXPECT_EQ(now->id, box->id);
+  EXPECT_EQ(now->first_seen_ns, box->first_seen_ns) << "it is as old as before";
+  EXPECT_EQ(drive.solid_voxels_in({-0.86, 2.14, 0.1}, {-0.6, 2.46, 0.56}), 0u) << "where it was alone";
+}
+
+TEST(PipelineChanges, SmallMoveIsOneToo) {
+  // 15 cm towards the camera: nothing of the old place is seen through.
+  Drive drive;
+  drive.watch(room_with({left_box(), right_cage()}), kLearn);
+  const auto box = drive.object_at(-0.6, 2.3);
+  ASSERT_TRUE(box);
+  const Scene after = room_with({solid(kBoxClass, {-0.6, 2.15}, kSize), right_cage()});
+  ASSERT_GT(drive.watch_for(EventKind::kMoved, after, kPromptly), 0) << text(drive.events());
+  drive.watch(after, 15);
+  EXPECT_EQ(drive.of_kind(EventKind::kMoved).size(), 1u) << text(drive.events());
+  EXPECT_TRUE(drive.of_kind(EventKind::kRemoved).empty()) << text(drive.events());
+  const auto now = drive.object_at(-0.6, 2.15);
+  ASSERT_TRUE(now);
+  EXPECT_EQ(now->id, box->id);
+  EXPECT_NEAR((now->box.pose.position_W - box->box.pose.position_W).y(), -0.15, 0.06);
+}
+
+TEST(PipelineChanges, NewBoxIsAdded) {
+  Drive drive;
+  drive.watch(room_with({right_cage()}), kLearn);
+  const Scene after = room_with({left_box(), right_cage()});
+  ASSERT_GT(drive.watch_for(EventKind::kAdded, after, kPromptly), 0) << text(drive.events());
+  drive.watch(after, 10);
+  EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << text(drive.events());
+  EXPECT_TRUE(drive.of_kind(EventKind::kMoved).empty());
+  EXPECT_TRUE(drive.of_kind(EventKind::kRemoved).empty());
+  EXPECT_TRUE(drive.object_at(-0.6, 2.3));
+}
+
+TEST(PipelineChanges, ThingOfAnotherClassInItsPlaceIsNotAMove) {
+  Drive drive;
+  drive.watch(room_with({left_box()}), kLearn);
+  drive.watch(room_with({solid(kCageClass, {0.3, 2.3}, kSize)}), 2 * kPromptly);
+  EXPECT_EQ(drive.of_kind(EventKind::kRemoved).size(), 1u) << text(drive.events());
+  EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << text(drive.events());
+  EXPECT_TRUE(drive.of_kind(EventKind::kMoved).empty()) << text(drive.events());
+}
+
+TEST(PipelineChanges, BoxThatComesBackElsewhereLaterHasMoved) {
+  Drive drive;
+  drive.watch(room_with({left_box()}), kLearn);
+  const auto box = drive.object_at(-0.6, 2.3);
+  ASSERT_TRUE(box);
+  drive.watch(room_with({}), 2 * kPromptly);
+  ASSERT_EQ(drive.of_kind(EventKind::kRemoved).size(), 1u) << text(drive.events());
+  const Scene after = room_with({solid(kBoxClass, {0.7, 2.3}, kSize)});
+  ASSERT_GT(drive.watch_for(EventKind::kMoved, after, kLearn), 0) << text(drive.events());
+  EXPECT_EQ(drive.of_kind(EventKind::kMoved)[0].object, box->id);
+  EXPECT_TRUE(drive.object_at(0.7, 2.3));
+}
+
+TEST(PipelineChanges, EventsNameFrameAndRobot) {
+  Drive drive;
+  const Scene scene = room_with({left_box()});
+  for (int i = 0; i < kLearn; ++i) {
+    Frame frame = drive.next_frame(scene);
+    frame.robot = "r7";
+    const FrameResult result = drive.process(frame);
+    for (const ObjectEvent& e : result.events) {
+      EXPECT_EQ(e.robot, "r7");
+      EXPECT_EQ(e.frame_sequence, frame.sequence);
+      EXPECT_EQ(e.stamp_ns, frame.stamp_ns);
+    }
+  }
+  EXPECT_FALSE(drive.events().empty());
+  EXPECT_EQ(drive.object_at(-0.6, 2.3)->last_robot, "r7");
+}
+
+}  // namespace
+}  // namespace pocd

@@ -1,0 +1,235 @@
+#include "pocd/state/lifecycle.hpp"
+
+#include <gtest/gtest.h>
+
+#include "pocd/common/random.hpp"
+#include "pocd/state/bayesian_update.hpp"
+
+namespace pocd {
+namespace {
+
+const StateConfig kState;
+const ChangeConfig kChange;
+
+LibraryObject known_object(int stationarity_class = 0) {
+  LibraryObject object(ObjectId{1}, 0.05);
+  object.confirmed = true;
+  object.stationarity_class = stationarity_class;
+  object.observations = 10;
+  object.belief = {0.0, 0.1, 8.0, 2.0};
+  std::vector<SurfacePoint> points;
+  for (int i = 0; i < 100; ++i) {
+    points.push_back({{0.05f * static_cast<float>(i % 10) + 0.02f, 0.05f * static_cast<float>(i / 10) + 0.02f, 0.02f},
+                      {0, 0, 1},
+                      0.01f});
+  }
+  object.model.fuse(points);
+  object.most_surfels = object.model.surfels().size();
+  return object;
+}
+
+OrientedBox box_of(double x, double y, const Eigen::Vector3d& size_m) {
+  OrientedBox box;
+  box.pose.position_W = {x, y, 0.5 * size_m.z()};
+  box.size_m = size_m;
+  return box;
+}
+
+Belief random_belief(Random& random) {
+  const double count = std::exp(random.uniform(std::log(0.2), std::log(kState.max_count)));
+  const double mean = random.uniform(0.02, 0.98);
+  return {random.uniform(-0.3, 0.3), std::exp(random.uniform(std::log(0.1), std::log(1.0))), mean * count,
+          (1 - mean) * count};
+}
+
+TEST(ApplyMeasurement, EvidenceAloneGivesTheBeliefAfterIt) {
+  Random random(51);
+  for (int i = 0; i < 2000; ++i) {
+    LibraryObject object = known_object(static_cast<int>(random.below(2)));
+    object.belief = random_belief(random);
+    const double delta_m = random.uniform(-1.2, 1.2) * kChange.delta_max_m * (i % 2 ? 1.0 : 0.05);
+    const Evidence e = apply_measurement(object, delta_m, {}, kState, kChange);
+    const Belief again = next_belief(e.before, e.delta_m, e.stationarity_class, e.k, kState, kChange);
+    ASSERT_EQ(again.mu, e.after.mu);
+    ASSERT_EQ(again.sigma, e.after.sigma);
+    ASSERT_EQ(again.alpha, e.after.alpha);
+    ASSERT_EQ(again.beta, e.after.beta);
+    ASSERT_EQ(object.belief.alpha, e.after.alpha) << "the object has it";
+    ASSERT_NEAR(e.c1 + e.c2, 1.0, 1e-12);
+    ASSERT_LE(std::abs(e.delta_m), kChange.delta_max_m);
+  }
+}
+
+TEST(ApplyMeasurement, EvidenceSaysHowMuchWasSeen) {
+  Sighting s;
+  s.total = 100;
+  s.hit = 30;
+  s.seen_through = 10;
+  LibraryObject object = known_object(1);
+  const Evidence e = apply_measurement(object, 0.01, s, kState, kChange);
+  EXPECT_EQ(e.visible_share, 0.4);
+  EXPECT_EQ(e.seen_through_share, 0.25);
+  EXPECT_EQ(e.stationarity_class, 1);
+  EXPECT_EQ(e.measurement_sigma_m, kChange.tau_m);
+  EXPECT_TRUE(e.rule.empty());
+}
+
+TEST(ApplyMeasurement, KFollowsClassAndKind) {
+  for (const int s : {0, 1}) {
+    for (const double delta_m : {0.0, kChange.delta_max_m}) {
+      LibraryObject object = known_object(s);
+      const bool inlier = delta_m == 0.0;
+      EXPECT_EQ(apply_measurement(object, delta_m, {}, kState, kChange).k, inlier == (s == 1) ? kState.k : 0.0);
+    }
+  }
+}
+
+TEST(NextBelief, IsTheBayesianStepWithItsBounds) {
+  Random random(52);
+  int bounded = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Belief before = random_belief(random);
+    const int s = static_cast<int>(random.below(2));
+    const double k = random.below(2) ? kState.k : 0.0;
+    const double delta_m = random.uniform(-0.3, 0.3);
+    const Belief plain = bayesian_update(before, {delta_m, s, kChange.tau_m, k}, kChange.delta_max_m).belief;
+    const Belief after = next_belief(before, delta_m, s, k, kState, kChange);
+    ASSERT_LE(after.alpha + after.beta, kState.max_count * (1 + 1e-12));
+    ASSERT_GE(after.sigma, kState.min_sigma_share * kChange.tau_m);
+    ASSERT_NEAR(after.stationarity(), plain.stationarity(), 1e-12) << "the cap keeps E[v]";
+    ASSERT_EQ(after.mu, plain.mu);
+    bounded += after.alpha + after.beta < plain.alpha + plain.beta;
+  }
+  EXPECT_GT(bounded, 50);
+}
+
+TEST(NextBelief, UpdateAboveVMaxIsNotApplied) {
+  StateConfig state;
+  state.max_stationarity = 0.9;
+  const Belief before{0.02, 0.15, 8.9, 1.1};
+  const Belief after = next_belief(before, 0.0, 1, 3.0, state, kChange);
+  EXPECT_EQ(after.alpha, before.alpha);
+  EXPECT_EQ(after.beta, before.beta);
+  EXPECT_EQ(after.mu, before.mu);
+  EXPECT_EQ(after.sigma, before.sigma);
+  // What lowers it is applied from there all the same.
+  EXPECT_LT(next_belief(before, kChange.delta_max_m, 0, 3.0, state, kChange).stationarity(), before.stationarity());
+}
+
+TEST(RemovalRule, NoneForAHealthyObject) {
+  EXPECT_FALSE(removal_rule(known_object(), kState, kChange));
+}
+
+TEST(RemovalRule, StationarityBelowThreshold) {
+  LibraryObject object = known_object();
+  object.belief.alpha = kState.remove_below * 10 - 1e-9;
+  object.belief.beta = 10 - object.belief.alpha;
+  EXPECT_EQ(removal_rule(object, kState, kChange), "stationarity_below_threshold");
+  object.belief.alpha = kState.remove_below * 10 + 1e-9;
+  object.belief.beta = 10 - object.belief.alpha;
+  EXPECT_FALSE(removal_rule(object, kState, kChange));
+}
+
+TEST(RemovalRule, ChangeEstablished) {
+  LibraryObject object = known_object();
+  object.belief.mu = -kChange.tau_m;
+  object.belief.sigma = 0.5 * kChange.tau_m;
+  EXPECT_EQ(removal_rule(object, kState, kChange), "change_established") << "the sign does not matter";
+  object.belief.sigma = 1.1 * kChange.tau_m;
+  EXPECT_FALSE(removal_rule(object, kState, kChange)) << "not sure enough";
+  object.belief.sigma = 0.1 * kChange.tau_m;
+  object.belief.mu = 0.5 * kChange.tau_m;
+  EXPECT_FALSE(removal_rule(object, kState, kChange)) << "a change that verifies the object";
+}
+
+TEST(RemovalRule, NothingLeft) {
+  LibraryObject object = known_object();
+  for (std::size_t i = 0; i < 95; ++i) object.model.surfels()[i].seen_through = 5;
+  object.model.erode(5);
+  EXPECT_EQ(removal_rule(object, kState, kChange), "nothing_left");
+  object = known_object();
+  for (std::size_t i = 0; i < 50; ++i) object.model.surfels()[i].seen_through = 5;
+  object.model.erode(5);
+  EXPECT_FALSE(removal_rule(object, kState, kChange)) << "half a thing is a thing";
+}
+
+TEST(RemovalRule, CandidatesGoEarly) {
+  LibraryObject object = known_object();
+  object.confirmed = false;
+  EXPECT_FALSE(removal_rule(object, kState, kChange));
+  object.frames_seen_through = 2;
+  EXPECT_EQ(removal_rule(object, kState, kChange), "candidate_seen_through");
+  object.frames_seen_through = 0;
+  object.frames_in_view = kState.tentative_frames + 1;
+  EXPECT_EQ(removal_rule(object, kState, kChange), "never_confirmed");
+  object.confirmed = true;
+  object.frames_seen_through = 2;
+  EXPECT_FALSE(removal_rule(object, kState, kChange)) << "these are rules for candidates alone";
+}
+
+TEST(Alike, SizesWithinAThirdWhicheverWayTheyLie) {
+  const OrientedBox a = box_of(0, 0, {1.0, 0.5, 0.8});
+  EXPECT_TRUE(alike(a, a, 0.0));
+  EXPECT_TRUE(alike(a, box_of(9, 9, {0.5, 1.0, 0.8}), 0.0)) << "turned by a quarter, elsewhere";
+  EXPECT_TRUE(alike(a, box_of(0, 0, {0.7, 0.5, 0.8}), 0.0));
+  EXPECT_FALSE(alike(a, box_of(0, 0, {0.6, 0.5, 0.8}), 0.0));
+  EXPECT_FALSE(alike(a, box_of(0, 0, {1.0, 0.5, 0.4}), 0.0)) << "height counts for itself";
+  EXPECT_TRUE(alike(a, box_of(0, 0, {1.0, 0.5, 0.4}), 0.45)) << "within the slack";
+  EXPECT_FALSE(alike(box_of(0, 0, {1, 1, 2}), box_of(0, 0, {2, 1, 1}), 0.0)) << "lying is not standing";
+}
+
+TEST(FitsInside, PartsOfAnySizeButNothingLarger) {
+  const OrientedBox whole = box_of(0, 0, {1.0, 0.5, 0.8});
+  EXPECT_TRUE(fits_inside(box_of(0, 0, {0.3, 0.02, 0.4}), whole, 0.0));
+  EXPECT_TRUE(fits_inside(box_of(0, 0, {0.5, 1.1, 0.9}), whole, 0.0)) << "within 20 %";
+  EXPECT_FALSE(fits_inside(box_of(0, 0, {1.3, 0.5, 0.8}), whole, 0.0));
+  EXPECT_FALSE(fits_inside(box_of(0, 0, {0.3, 0.3, 1.2}), whole, 0.0));
+  EXPECT_TRUE(fits_inside(box_of(0, 0, {0.3, 0.3, 1.2}), whole, 0.5));
+}
+
+class Relocation : public ::testing::Test {
+ protected:
+  static constexpr StampNs kSecond = 1'000'000'000;
+  void removed(std::uint32_t id, ClassId class_id, const OrientedBox& box, double at_s) {
+    memory_.remember({ObjectId{id}, class_id, box, 5, static_cast<StampNs>(at_s) * kSecond});
+  }
+  std::optional<ObjectId> find(ClassId class_id, const OrientedBox& box, double at_s) {
+    const auto* found = memory_.find(class_id, box, static_cast<StampNs>(at_s) * kSecond, 60.0, 2.5, 0.15);
+    return found ? std::optional(found->id) : std::nullopt;
+  }
+  const Eigen::Vector3d size_{1.0, 0.5, 0.8};
+  RelocationMemory memory_;
+};
+
+TEST_F(Relocation, LikeThingOfTheClassIsTheRemovedOne) {
+  removed(1, 7, box_of(0, 0, size_), 100);
+  EXPECT_EQ(find(7, box_of(20, 20, size_), 101), ObjectId{1}) << "seen whole: at any distance";
+  EXPECT_FALSE(find(9, box_of(1, 0, size_), 101)) << "another class";
+  EXPECT_FALSE(find(7, box_of(1, 0, {2.0, 1.5, 0.8}), 101)) << "larger";
+}
+
+TEST_F(Relocation, PartialViewMustBeWithinReach) {
+  removed(1, 7, box_of(0, 0, size_), 100);
+  const Eigen::Vector3d part(0.4, 0.05, 0.7);
+  EXPECT_EQ(find(7, box_of(2.0, 0, part), 101), ObjectId{1});
+  EXPECT_FALSE(find(7, box_of(3.0, 0, part), 101));
+}
+
+TEST_F(Relocation, NearestOfSeveral) {
+  removed(1, 7, box_of(0, 0, size_), 100);
+  removed(2, 7, box_of(4, 0, size_), 100);
+  EXPECT_EQ(find(7, box_of(3, 0, size_), 101), ObjectId{2});
+  EXPECT_EQ(find(7, box_of(1, 0, size_), 101), ObjectId{1});
+}
+
+TEST_F(Relocation, ForgetsAfterTheWindowAndWhenFound) {
+  removed(1, 7, box_of(0, 0, size_), 100);
+  removed(2, 7, box_of(0, 0, size_), 150);
+  EXPECT_EQ(find(7, box_of(0, 0, size_), 160), ObjectId{1}) << "at the window's end";
+  EXPECT_EQ(find(7, box_of(0, 0, size_), 161), ObjectId{2});
+  memory_.forget(ObjectId{2});
+  EXPECT_FALSE(find(7, box_of(0, 0, size_), 161));
+}
+
+}  // namespace
+}  // namespace pocd
