@@ -50,6 +50,8 @@ PayloadWriter::PayloadWriter(std::shared_ptr<Participant> participant, const Rec
   }
   DataWriterQos qos = owner.writer_qos(topic.name, delivery);
   if (topic.exclusive) qos.ownership().kind = EXCLUSIVE_OWNERSHIP_QOS;
+  // Both are recorded, and come back, as what they were.
+  qos.writer_data_lifecycle().autodispose_unregistered_instances = false;
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (impl_->writer == nullptr) throw InputError("cannot create a writer of " + topic.name);
 }

@@ -228,6 +228,9 @@ void Recorder::Impl::open_reader(Line& line) {
     delivery.transient_local = topic.transient_local;
     delivery.keep_last = 0;
     DataReaderQos qos = participant->reader_qos(topic.name, delivery);
+    // Brings the instance's handle with every sample: a type that is not known has no other way to
+    // tell.
+    qos.expects_inline_qos(topic.keyed);
     if (topic.exclusive) qos.ownership().kind = EXCLUSIVE_OWNERSHIP_QOS;
     line.tap =
         std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key));

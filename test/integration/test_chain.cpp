@@ -15,6 +15,10 @@
 namespace pocd {
 namespace {
 
+// Makes the pipeline slower than the player, so that with a queue of one frame the player has to be
+// held back all the time.
+constexpr const char* kFineMap = "map.voxel_size_m=0.02";
+
 RunSummary offline(const std::string& input, const std::filesystem::path& output,
                    const std::vector<std::string>& more = {}) {
   std::vector<std::string> command{bin("pocd_map"),
@@ -84,13 +88,14 @@ class ObjectWatch {
 
 TEST(Chain, LiveEqualsOfflineAndRemovalIsDisposed) {
   const TemporaryFolder folder;
-  const RunSummary expected = offline(scenario(), folder.path() / "offline");
+  const RunSummary expected = offline(scenario(), folder.path() / "offline", {"--set", kFineMap});
   ASSERT_GT(expected.removed, 0u) << "the scenario has to have a removal to be a test";
   ASSERT_GT(expected.objects, 0u);
 
   const TestDomain domain;
   ObjectWatch objects(domain);
-  Process node(node_command(domain, {"--lossless", "--epoch", "77"}));
+  Process node(node_command(
+      domain, {"--lossless", "--epoch", "77", "--set", kFineMap, "--set", "node.queue_frames=1"}));
   ASSERT_TRUE(eventually([&] { return objects.matched(); }));
   const auto output = folder.path() / "mirror";
   Process mirror(

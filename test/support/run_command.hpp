@@ -69,6 +69,8 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
+  /// What it has said on stderr so far.
+  std::string err() const { return read_text(folder_.path() / "err"); }
   void signal(int number) { ::kill(pid_, number); }
 
   CommandResult wait() {

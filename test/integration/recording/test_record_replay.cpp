@@ -1,0 +1,260 @@
+// What was recorded comes back as it was: payloads, quality of service, disposes, and the map.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "bus_processes.hpp"
+#include "pocd/recording/cdr.hpp"
+#include "pocd/recording/recording_reader.hpp"
+#include "recordings.hpp"
+
+namespace pocd {
+namespace {
+
+namespace fs = std::filesystem;
+using recording::Bytes;
+using recording::Kept;
+using recording::MessageHeader;
+using Folder = recording::TemporaryFolder;
+
+using ByTopic = std::map<std::string, std::vector<Bytes>>;
+
+ByTopic payloads(recording::RecordingReader& reader) {
+  ByTopic out;
+  for (Kept& kept : recording::read_all(reader)) out[kept.topic].push_back(std::move(kept.data));
+  return out;
+}
+
+ByTopic payloads(const fs::path& file) { return payloads(*recording::open_recording(file)); }
+
+std::string config() { return std::string(POCD_SOURCE_DIR) + "/config/simulated.yaml"; }
+std::string scenario() {
+  return std::string(POCD_SOURCE_DIR) + "/test/integration/recording/small_run.yaml";
+}
+
+/// The simulated run as the bus carries it.
+void record_simulation(const fs::path& file, const std::vector<std::string>& more = {}) {
+  Process recorder({command("pocd_record"), "--output", file.string()});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  std::vector<std::string> play{command("pocd_play"), "--dataset", "sim",        "--input",
+                                scenario(),           "--fast",    "--lossless", "--no-color"};
+  play.insert(play.end(), more.begin(), more.end());
+  const CommandResult played = run_command(play);
+  ASSERT_EQ(played.exit_code, 0) << played.err;
+  const CommandResult recorded = stop(recorder);
+  EXPECT_NE(recorded.out.find(" 0 dropped, 0 lost"), std::string::npos) << recorded.out;
+}
+
+std::string digest_in(const std::string& text, const std::string& before) {
+  const std::size_t at = text.find(before);
+  if (at == std::string::npos) return "none in: " + text;
+  const std::size_t begin = at + before.size();
+  return text.substr(begin, text.find_first_not_of("0123456789abcdef", begin) - begin);
+}
+
+std::string offline_digest(const fs::path& recording, const std::string& threads,
+                           const std::vector<std::string>& more = {}) {
+  const Folder folder;
+  std::vector<std::string> map{command("pocd_map"),
+                               "--dataset",
+                               "mcap",
+                               "--input",
+                               recording.string(),
+                               "--config",
+                               config(),
+                               "--threads",
+                               threads,
+                               "--output",
+                               folder.path().string()};
+  map.insert(map.end(), more.begin(), more.end());
+  const CommandResult mapped = run_command(map);
+  EXPECT_EQ(mapped.exit_code, 0) << mapped.err;
+  EXPECT_EQ(mapped.err, "");
+  return digest_in(mapped.out, "map ");
+}
+
+/// Plays a recording to the node and gives the digest of the mirror's copy.
+std::string replayed_digest(const fs::path& recording, const std::vector<std::string>& speed,
+                            const std::string& threads) {
+  Process mirror({command("pocd_mirror"), "--until-end", "--timeout", "300"});
+  Process node({command("pocd_node"), "--config", config(), "--robot", "robot1", "--robot",
+                "robot2", "--lossless", "--set", "threads=" + threads});
+  if (!says(node, "running on domain")) return "";
+  std::vector<std::string> play{command("pocd_play"),
+                                recording.string(),
+                                "--lossless",
+                                "--topics",
+                                "/robot*",
+                                "--topics",
+                                "/tf*"};
+  play.insert(play.end(), speed.begin(), speed.end());
+  const CommandResult played = run_command(play);
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  stop(node);
+  const CommandResult mirrored = mirror.wait();
+  EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err;
+  return digest_in(mirrored.out, "digest ");
+}
+
+TEST(RecordReplay, KeepsEveryPayloadOfAReplay) {
+  const Folder folder;
+  record_simulation(folder / "first.mcap", {"--max-frames", "20"});
+  Process recorder({command("pocd_record"), "--output", (folder / "second.mcap").string(),
+                    "--compression", "lz4"});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  const CommandResult played =
+      run_command({command("pocd_play"), (folder / "first.mcap").string(), "--fast", "--lossless"});
+  ASSERT_EQ(played.exit_code, 0) << played.err;
+  stop(recorder);
+  const ByTopic first = payloads(folder / "first.mcap");
+  EXPECT_EQ(first.count("/robot1/depth/image_raw"), 1u);
+  EXPECT_EQ(first.count("/tf_static"), 1u);
+  EXPECT_TRUE(first == payloads(folder / "second.mcap"));
+}
+
+/// Topics of a type that nothing here was built with.
+void write_foreign(const fs::path& file) {
+  recording::McapWriter writer(file);
+  const auto schema = writer.add_schema("foreign::Thing", "", "");
+  const auto qos = [](const std::string& reliable, const std::string& latched,
+                      const std::string& keyed) {
+    return "reliability: " + reliable + "\ndurability: " + latched +
+           "\nownership: false\nkeyed: " + keyed;
+  };
+  const auto plain = writer.add_channel(
+      schema, "plain", "cdr",
+      {{"qos", qos("true", "false", "false")}, {"ros2-types", "false"}, {"partitions", "a|b"}});
+  const auto best_effort = writer.add_channel(
+      schema, "best_effort", "cdr",
+      {{"qos", qos("false", "false", "false")}, {"ros2-types", "false"}, {"partitions", ""}});
+  const auto keyed_schema = writer.add_schema("foreign::Keyed", "", "");
+  const auto keyed = writer.add_channel(
+      keyed_schema, "keyed", "cdr",
+      {{"qos", qos("true", "true", "true")}, {"ros2-types", "false"}, {"partitions", ""}});
+  const auto instances =
+      writer.add_channel(0, "keyed/_instances", "cdr", {{"instances_of", "keyed"}});
+  std::uint64_t time_ns = 1'000'000'000;
+  const auto write = [&](std::uint16_t channel, const Bytes& bytes) {
+    writer.write({channel, 0, time_ns, time_ns}, bytes.data(), bytes.size());
+  };
+  const auto instance = [&](std::uint8_t change, std::uint8_t id) {
+    Bytes bytes{0, 1, 0, 0, change};
+    bytes.resize(4 + 1 + 16);
+    bytes[20] = id;
+    write(instances, bytes);
+  };
+  for (std::uint8_t i = 0; i < 10; ++i) {
+    time_ns += 20'000'000;
+    // Whole words: the bus fills the last one up.
+    const Bytes bytes{0, 1, 0, 0, i, 2, 3, 4};
+    write(plain, bytes);
+    write(best_effort, bytes);
+    instance(0, static_cast<std::uint8_t>(1 + i % 3));
+    write(keyed, bytes);
+  }
+  time_ns += 20'000'000;
+  instance(1, 2);  // disposed
+  instance(2, 3);  // unregistered
+  writer.close();
+}
+
+TEST(RecordReplay, UnknownTypesPartitionsAndDisposesComeBack) {
+  const Folder folder;
+  write_foreign(folder / "first.mcap");
+  Process recorder({command("pocd_record"), "--output", (folder / "second.mcap").string()});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  const CommandResult played = run_command(
+      {command("pocd_play"), (folder / "first.mcap").string(), "--rate", "2", "--wait-for", "*"});
+  ASSERT_EQ(played.exit_code, 0) << played.err;
+  EXPECT_NE(played.out.find("30 messages and 2 instance changes sent"), std::string::npos)
+      << played.out;
+  stop(recorder);
+
+  ByTopic first = payloads(folder / "first.mcap");
+  const auto reader = recording::open_recording(folder / "second.mcap");
+  ByTopic second = payloads(*reader);
+  // Best effort promises nothing, except the order.
+  EXPECT_LE(second["best_effort"].size(), 10u);
+  first.erase("best_effort");
+  second.erase("best_effort");
+  // When the player goes, the bus says that its instances have no writer any more.
+  std::vector<Bytes>& changes = second["keyed/_instances"];
+  ASSERT_GE(changes.size(), first["keyed/_instances"].size());
+  changes.resize(first["keyed/_instances"].size());
+  for (const auto& [topic, list] : first) {
+    EXPECT_TRUE(list == second[topic]) << topic << ": " << list.size() << " became " << second[topic].size();
+  }
+  std::map<std::string, const recording::RecordedChannel*> channels;
+  for (const auto& channel : reader->channels()) channels[channel.topic] = &channel;
+  EXPECT_EQ(channels.at("plain")->metadata.at("partitions"), "a|b");
+  EXPECT_EQ(channels.at("plain")->type, "foreign::Thing");
+  EXPECT_NE(channels.at("best_effort")->metadata.at("qos").find("reliability: false"),
+            std::string::npos);
+  EXPECT_NE(channels.at("keyed")->metadata.at("qos").find("durability: true"), std::string::npos);
+  EXPECT_NE(channels.at("keyed")->metadata.at("qos").find("keyed: true"), std::string::npos);
+}
+
+TEST(RecordReplay, AKilledRecorderLeavesAReadableFile) {
+  const Folder folder;
+  Process recorder({command("pocd_record"), "--output", (folder / "killed.mcap").string()});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  Process player({command("pocd_play"), "--dataset", "sim", "--input", scenario(), "--no-color"});
+  // One chunk is there as soon as the first second is over.
+  for (int i = 0; i < 1200 && fs::file_size(folder / "killed.mcap") < 10'000; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  recorder.signal(SIGKILL);
+  EXPECT_EQ(recorder.wait().exit_code, 128 + SIGKILL);
+  player.signal(SIGTERM);
+  player.wait();
+  const CommandResult info =
+      run_command({command("pocd_info"), "--verify", (folder / "killed.mcap").string()});
+  EXPECT_EQ(info.exit_code, 1);
+  EXPECT_NE(info.err.find("no footer at the end"), std::string::npos) << info.err;
+  EXPECT_NE(info.out.find("/robot1/depth/image_raw"), std::string::npos) << info.out;
+  EXPECT_GT(payloads(folder / "killed.mcap")["/robot1/depth/image_raw"].size(), 0u);
+}
+
+TEST(SameMap, OfflineAndReplaysAtAnySpeed) {
+  const Folder folder;
+  record_simulation(folder / "run.mcap");
+  const std::string expected = offline_digest(folder / "run.mcap", "1");
+  ASSERT_EQ(expected.size(), 32u) << expected;
+  EXPECT_EQ(offline_digest(folder / "run.mcap", "2"), expected);
+  EXPECT_EQ(replayed_digest(folder / "run.mcap", {"--rate", "1"}, "1"), expected);
+  EXPECT_EQ(replayed_digest(folder / "run.mcap", {"--rate", "10"}, "2"), expected);
+  EXPECT_EQ(replayed_digest(folder / "run.mcap", {"--fast"}, "1"), expected);
+  EXPECT_EQ(replayed_digest(folder / "run.mcap", {"--fast"}, "2"), expected);
+}
+
+TEST(SameMap, AtATenthOfTheSpeed) {
+  const Folder folder;
+  record_simulation(folder / "run.mcap", {"--max-frames", "8"});
+  const std::string expected = offline_digest(folder / "run.mcap", "1");
+  ASSERT_EQ(expected.size(), 32u) << expected;
+  EXPECT_EQ(replayed_digest(folder / "run.mcap", {"--rate", "0.1"}, "1"), expected);
+}
+
+TEST(SameMap, ALiveRunWithDroppedFramesFromItsRecording) {
+  const Folder folder;
+  const fs::path file = folder / "live.mcap";
+  Process recorder({command("pocd_record"), "--output", file.string()});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  Process mirror({command("pocd_mirror"), "--until-end", "--timeout", "300"});
+  Process node({command("pocd_node"), "--config", config(), "--robot", "robot1", "--robot",
+                "robot2", "--set", "node.queue_frames=1", "--set", "node.sync_wait_s=0.5"});
+  ASSERT_TRUE(says(recorder, "recording pocd/frames"));
+  // The player waits for the recorder, which is reliable, but not for the node, which has no time
+  // for every frame.
+  const CommandResult played = run_command({command("pocd_play"), "--dataset", "sim", "--input",
+                                            scenario(), "--fast", "--lossless", "--no-color"});
+  ASSERT_EQ(played.exit_code, 0) << played.err;
+  stop(node);
+  const CommandResult mirrored = mirror.wait();
+  EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err;
+  stop(recorder);
+  EXPECT_EQ(offline_digest(file, "1", {"--as-live"}), digest_in(mirrored.out, "digest "));
+}
+
+}  // namespace
+}  // namespace pocd
