@@ -25,7 +25,8 @@ class Associate : public ::testing::Test {
       for (const Observation& o : s.observations.list) {
         LibraryObject* object = nullptr;
         for (const auto& [id, known] : library_.all()) {
-          if (box_overlap(known->box, o.box, 0.1) > 0.2 && known->class_id == o.class_id) object = known.get();
+          if (box_overlap(known->box, o.box, 0.1) > 0.2 && known->class_id == o.class_id)
+            object = known.get();
         }
         if (!object) object = &library_.create(config_.map.voxel_size_m);
         object->class_id = o.class_id;
@@ -51,12 +52,14 @@ class Associate : public ::testing::Test {
     for (const auto& [id, object] : library_.all()) {
       Candidate candidate;
       candidate.object = object.get();
-      sight_object(object->model, object->class_id, 1, now_.cloud, field, now_.observations,
-                   {0.5 * config_.change.tau_m, config_.change.pose_tolerance_m, config_.map.max_depth_m},
-                   config_.depth_noise, candidate.sighting);
+      sight_object(
+          object->model, object->class_id, 1, now_.cloud, field, now_.observations,
+          {0.5 * config_.change.tau_m, config_.change.pose_tolerance_m, config_.map.max_depth_m},
+          config_.depth_noise, candidate.sighting);
       candidates_.push_back(candidate);
     }
-    return associate(candidates_.data(), candidates_.size(), now_.observations, viewpoint_, config_.association);
+    return associate(candidates_.data(), candidates_.size(), now_.observations, viewpoint_,
+                     config_.association);
   }
 
   test::Segmented segmented(const Scene& scene, const Pose& T_W_C) {
@@ -65,7 +68,9 @@ class Associate : public ::testing::Test {
     return test::segment(frame, config_);
   }
 
-  const LibraryObject& object_of(const Match& match) const { return *candidates_[match.candidate].object; }
+  const LibraryObject& object_of(const Match& match) const {
+    return *candidates_[match.candidate].object;
+  }
 
   PipelineConfig config_ = test::room_config();
   Pose viewpoint_ = test::look_from({0.1, 0, 1.1});
@@ -76,7 +81,8 @@ class Associate : public ::testing::Test {
 };
 
 TEST_F(Associate, ObjectInPlaceMatchesWithoutMotion) {
-  const Scene scene = room_with({solid(kBoxClass, {-0.6, 2.3}, kSize), solid(kBoxClass, {0.6, 2.5}, kSize, 0.4)});
+  const Scene scene =
+      room_with({solid(kBoxClass, {-0.6, 2.3}, kSize), solid(kBoxClass, {0.6, 2.5}, kSize, 0.4)});
   learn(scene);
   ASSERT_EQ(library_.size(), 2u);
   const AssociationResult result = look(scene);
@@ -86,8 +92,8 @@ TEST_F(Associate, ObjectInPlaceMatchesWithoutMotion) {
     EXPECT_EQ(match.displacement_m, 0.0);
     EXPECT_TRUE(match.T_new_old.isApprox(Pose::Identity()));
     EXPECT_FALSE(object_of(match).icp_target) << "no alignment was prepared, so none was made";
-    const Eigen::Vector3d apart =
-        object_of(match).box.pose.position_W - now_.observations.list[match.observation].box.pose.position_W;
+    const Eigen::Vector3d apart = object_of(match).box.pose.position_W -
+                                  now_.observations.list[match.observation].box.pose.position_W;
     EXPECT_LT(apart.norm(), 0.15);
   }
   EXPECT_EQ(result.doubtful, (std::vector<bool>{false, false}));
@@ -103,7 +109,9 @@ TEST_F(Associate, MovedBoxIsMatchedWithItsDisplacement) {
   EXPECT_TRUE(result.doubtful[0]);
   // Half a voxel of surfel spacing and 2 cm of depth noise averaged over some hundred points.
   EXPECT_NEAR(match.displacement_m, std::hypot(0.6, 0.1), 0.05);
-  EXPECT_LT((match.T_new_old * Eigen::Vector3d(-0.2, 2.3, 0.3) - Eigen::Vector3d(0.4, 2.2, 0.3)).norm(), 0.05);
+  EXPECT_LT(
+      (match.T_new_old * Eigen::Vector3d(-0.2, 2.3, 0.3) - Eigen::Vector3d(0.4, 2.2, 0.3)).norm(),
+      0.05);
   EXPECT_EQ(match.sign, 1) << "it came nearer to the camera";
   EXPECT_LE(match.cost, config_.association.cutoff_cost);
 }
@@ -137,14 +145,15 @@ TEST_F(Associate, FartherThanTheGateIsAnotherThing) {
 TEST_F(Associate, AnUnlikeThingIsNotTheMovedOne) {
   // A low, wide thing of the class beside the empty place does not fit the tall one.
   learn(room_with({solid(kBoxClass, {-0.2, 2.3}, {0.4, 0.4, 1.2})}));
-  const AssociationResult result = look(room_with({solid(kBoxClass, {0.4, 2.2}, {1.0, 0.8, 0.3}, 0.5)}));
+  const AssociationResult result =
+      look(room_with({solid(kBoxClass, {0.4, 2.2}, {1.0, 0.8, 0.3}, 0.5)}));
   EXPECT_TRUE(result.matches.empty());
 }
 
 TEST_F(Associate, HiddenObjectIsNeitherMatchedNorInDoubt) {
   learn(room_with({solid(kBoxClass, {0, 2.6}, kSize)}));
-  const AssociationResult result =
-      look(room_with({solid(kBoxClass, {0, 2.6}, kSize), solid(kCageClass, {0, 1.3}, {1.4, 0.2, 1.4})}));
+  const AssociationResult result = look(
+      room_with({solid(kBoxClass, {0, 2.6}, kSize), solid(kCageClass, {0, 1.3}, {1.4, 0.2, 1.4})}));
   EXPECT_TRUE(result.matches.empty());
   EXPECT_FALSE(result.doubtful[0]);
 }
@@ -154,11 +163,13 @@ TEST_F(Associate, PiecesOfAnObjectAreNotNewThings) {
   const SceneObject box = solid(kBoxClass, {0, 2.6}, {1.8, 0.3, 0.7});
   learn(room_with({box}));
   ASSERT_EQ(library_.size(), 1u);
-  const AssociationResult result = look(room_with({box, solid(kCageClass, {0, 1.7}, {0.15, 0.15, 1.5})}));
+  const AssociationResult result =
+      look(room_with({box, solid(kCageClass, {0, 1.7}, {0.15, 0.15, 1.5})}));
   ASSERT_EQ(result.matches.size(), 1u);
   EXPECT_EQ(candidates_[result.matches[0].candidate].object->class_id, kBoxClass);
   int new_boxes = 0;
-  for (const std::int32_t j : result.unassigned) new_boxes += now_.observations.list[j].class_id == kBoxClass;
+  for (const std::int32_t j : result.unassigned)
+    new_boxes += now_.observations.list[j].class_id == kBoxClass;
   EXPECT_EQ(new_boxes, 0);
   int seen_boxes = 0;
   for (const Observation& o : now_.observations.list) seen_boxes += o.class_id == kBoxClass;
@@ -168,9 +179,9 @@ TEST_F(Associate, PiecesOfAnObjectAreNotNewThings) {
 TEST_F(Associate, EveryObservationIsMatchedOnceOrNamed) {
   learn(room_with({solid(kBoxClass, {-0.8, 2.3}, kSize), solid(kBoxClass, {0.1, 2.6}, kSize),
                    solid(kCageClass, {0.9, 2.3}, kSize)}));
-  const AssociationResult result =
-      look(room_with({solid(kBoxClass, {-0.8, 2.3}, kSize), solid(kBoxClass, {0.5, 2.3}, kSize, 0.3),
-                      solid(kCageClass, {1.0, 2.9}, {0.3, 0.3, 1.2})}));
+  const AssociationResult result = look(
+      room_with({solid(kBoxClass, {-0.8, 2.3}, kSize), solid(kBoxClass, {0.5, 2.3}, kSize, 0.3),
+                 solid(kCageClass, {1.0, 2.9}, {0.3, 0.3, 1.2})}));
   std::vector<int> times(now_.observations.list.size(), 0);
   for (const Match& match : result.matches) ++times[match.observation];
   for (const auto& piece : result.pieces) ++times[piece.observation];
@@ -206,7 +217,8 @@ TEST_F(Associate, AlignInPlaceSaysWhenItDoesNotFit) {
   learn(room_with({solid(kBoxClass, {0, 2.3}, kSize)}));
   LibraryObject& object = *library_.all().begin()->second;
   now_ = segmented(room_with({solid(kBoxClass, {0, 2.3}, {1.4, 0.3, 1.2}, 0.7)}), viewpoint_);
-  EXPECT_FALSE(align_in_place(object, now_.observations.list.at(0), viewpoint_, config_.association));
+  EXPECT_FALSE(
+      align_in_place(object, now_.observations.list.at(0), viewpoint_, config_.association));
   EXPECT_FALSE(align_in_place(object, {}, viewpoint_, config_.association)) << "no points";
 }
 

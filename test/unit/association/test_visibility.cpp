@@ -100,7 +100,8 @@ TEST(Visibility, DynamicPixelsHideWhereverTheyAre) {
   // A person before the place, at it and behind it: in none of these cases the place is visible
   // (a walking person's depth and mask are not of the same instant).
   for (const double y : {1.5, 2.3, 2.5}) {
-    const Frame frame = shoot(room_with({solid(kPersonClass, {0, y}, {2.0, 0.2, 1.8})}), viewpoint());
+    const Frame frame =
+        shoot(room_with({solid(kPersonClass, {0, y}, {2.0, 0.2, 1.8})}), viewpoint());
     const Sighting s = sight(front_of_the_box(), frame);
     EXPECT_EQ(s.visible(), 0) << y;
     EXPECT_GT(s.occluded, 0.9 * s.total) << y;
@@ -129,9 +130,9 @@ TEST(Visibility, SurfelsFacingAwayAreOutOfView) {
 }
 
 TEST(Visibility, EdgeWithinThePoseToleranceIsNotSeenThrough) {
-  // The box stands where it was, but its surfels are taken to be 6 cm to the side: those at its edge
-  // project beside it, on the wall behind. With a tolerance of 8 cm none of them counts as seen
-  // through; without it some do.
+  // The box stands where it was, but its surfels are taken to be 6 cm to the side: those at its
+  // edge project beside it, on the wall behind. With a tolerance of 8 cm none of them counts as
+  // seen through; without it some do.
   const ObjectModel model = front_of_the_box();
   ObjectModel shifted(kSpacing_m);
   std::vector<SurfacePoint> points;

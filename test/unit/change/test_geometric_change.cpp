@@ -28,8 +28,10 @@ double projective(const Sighting& sighting, const Match& match, const ChangeConf
 }
 
 TEST(ProjectiveChange, IsMinusTheMedianDifference) {
-  EXPECT_NEAR(projective(with_differences({0.03f, -0.01f, 0.02f}), {}), -0.02, 1e-7) << "farther: negative";
-  EXPECT_NEAR(projective(with_differences({-0.05f, -0.05f, 0.9f}), {}), 0.05, 1e-7) << "nearer: positive";
+  EXPECT_NEAR(projective(with_differences({0.03f, -0.01f, 0.02f}), {}), -0.02, 1e-7)
+      << "farther: negative";
+  EXPECT_NEAR(projective(with_differences({-0.05f, -0.05f, 0.9f}), {}), 0.05, 1e-7)
+      << "nearer: positive";
   EXPECT_EQ(projective(with_differences({}), {}), 0.0);
 }
 
@@ -77,28 +79,31 @@ Pair object_and_observation(const SceneObject& before, const SceneObject& after)
   pair.now = test::segment(shoot(room_with({after}), T_W_C), config);
   DepthField field;
   field.update(pair.now.cloud);
-  sight_object(pair.object.model, kBoxClass, 1, pair.now.cloud, field, pair.now.observations, {0.1, 0.03, 4.0},
-               config.depth_noise, pair.sighting);
+  sight_object(pair.object.model, kBoxClass, 1, pair.now.cloud, field, pair.now.observations,
+               {0.1, 0.03, 4.0}, config.depth_noise, pair.sighting);
   return pair;
 }
 
 double measured(const Pair& pair, const Match& match, const ChangeConfig& config) {
-  return geometric_change(pair.object, pair.now.observations.list.at(0), pair.sighting, match, pair.now.cloud,
-                          config);
+  return geometric_change(pair.object, pair.now.observations.list.at(0), pair.sighting, match,
+                          pair.now.cloud, config);
 }
 
 TEST(GeometricChange, SmallStepsOfARealBox) {
-  // Two centimetres along the view. Of the 3 x 3 pixels around a point the one nearest to the expected
-  // depth is taken; on a face that slopes by 0.3 this hides up to 5 mm, and the top does not move at
-  // all, so that the median lies near the lower end of the front's: 9 mm.
+  // Two centimetres along the view. Of the 3 x 3 pixels around a point the one nearest to the
+  // expected depth is taken; on a face that slopes by 0.3 this hides up to 5 mm, and the top does
+  // not move at all, so that the median lies near the lower end of the front's: 9 mm.
   const ChangeConfig config;
-  EXPECT_NEAR(measured(object_and_observation(solid(kBoxClass, {0, 2.3}, kSize), solid(kBoxClass, {0, 2.28}, kSize)),
+  EXPECT_NEAR(measured(object_and_observation(solid(kBoxClass, {0, 2.3}, kSize),
+                                              solid(kBoxClass, {0, 2.28}, kSize)),
                        {}, config),
               0.02, 0.009);
-  EXPECT_NEAR(measured(object_and_observation(solid(kBoxClass, {0, 2.3}, kSize), solid(kBoxClass, {0, 2.32}, kSize)),
+  EXPECT_NEAR(measured(object_and_observation(solid(kBoxClass, {0, 2.3}, kSize),
+                                              solid(kBoxClass, {0, 2.32}, kSize)),
                        {}, config),
               -0.02, 0.009);
-  EXPECT_NEAR(measured(object_and_observation(solid(kBoxClass, {0, 2.3}, kSize), solid(kBoxClass, {0, 2.3}, kSize)),
+  EXPECT_NEAR(measured(object_and_observation(solid(kBoxClass, {0, 2.3}, kSize),
+                                              solid(kBoxClass, {0, 2.3}, kSize)),
                        {}, config),
               0.0, 0.002);
 }
@@ -121,7 +126,8 @@ TEST(GeometricChange, RayTracedIsThePublishedMeasureOfTheSameClouds) {
   for (const SurfacePoint& p : pair.now.observations.list[0].points) {
     observation_C.push_back((T_C_W * p.point_W.cast<double>()).cast<float>());
   }
-  const auto expected = ray_traced_change(object_C, observation_C, -1.0, {0.05, config.tsdf_truncation_m, config.lambda_diff});
+  const auto expected = ray_traced_change(object_C, observation_C, -1.0,
+                                          {0.05, config.tsdf_truncation_m, config.lambda_diff});
   ASSERT_TRUE(expected);
   // Single and double precision transforms may put a sample into another voxel: a few of thousands.
   EXPECT_NEAR(delta, expected->delta_m, 0.002);
@@ -134,8 +140,8 @@ TEST(GeometricChange, RayTracedWithoutACommonVoxelIsTheDisplacement) {
   ChangeConfig config;
   config.measure = "ray_traced";
   config.tsdf_truncation_m = 0.1;
-  const Pair pair =
-      object_and_observation(solid(kBoxClass, {-0.8, 2.3}, kSize), solid(kBoxClass, {0.8, 2.3}, kSize));
+  const Pair pair = object_and_observation(solid(kBoxClass, {-0.8, 2.3}, kSize),
+                                           solid(kBoxClass, {0.8, 2.3}, kSize));
   Match match;
   match.stationary = false;
   match.displacement_m = 1.6;

@@ -9,7 +9,8 @@
 namespace pocd {
 namespace {
 
-OrientedBox box_at(double x, double y, const Eigen::Vector3d& size_m = {0.5, 0.5, 1.0}, double yaw_rad = 0.0) {
+OrientedBox box_at(double x, double y, const Eigen::Vector3d& size_m = {0.5, 0.5, 1.0},
+                   double yaw_rad = 0.0) {
   OrientedBox box;
   box.pose.position_W = {x, y, 0.5};
   box.pose.yaw_rad = yaw_rad;
@@ -53,7 +54,8 @@ TEST(ObjectLibrary, NearMissesNothingAndIsNotFarOff) {
   std::vector<ObjectId> ids;
   const auto random_box = [&] {
     return box_at(random.uniform(-20, 20), random.uniform(-20, 20),
-                  {random.uniform(0.1, 6), random.uniform(0.1, 2), 1.0}, random.uniform(-M_PI, M_PI));
+                  {random.uniform(0.1, 6), random.uniform(0.1, 2), 1.0},
+                  random.uniform(-M_PI, M_PI));
   };
   for (int i = 0; i < 150; ++i) {
     LibraryObject& object = library.create(0.05);
@@ -65,7 +67,8 @@ TEST(ObjectLibrary, NearMissesNothingAndIsNotFarOff) {
   for (int i = 130; i < 150; ++i) library.erase(ids[i]);
   int listed = 0;
   for (int q = 0; q < 500; ++q) {
-    const Eigen::Vector3d center(random.uniform(-25, 25), random.uniform(-25, 25), random.uniform(-1, 3));
+    const Eigen::Vector3d center(random.uniform(-25, 25), random.uniform(-25, 25),
+                                 random.uniform(-1, 3));
     const double radius = random.uniform(0.0, 5.0);
     const std::vector<ObjectId> near = library.near(center, radius);
     listed += static_cast<int>(near.size());

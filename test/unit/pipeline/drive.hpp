@@ -14,7 +14,8 @@ namespace pocd::test {
 
 class Drive {
  public:
-  explicit Drive(const PipelineConfig& config = room_config()) : config_(config), pipeline_(config) {}
+  explicit Drive(const PipelineConfig& config = room_config())
+      : config_(config), pipeline_(config) {}
 
   /// Next frame of the drive, with noise, of this scene.
   Frame next_frame(const Scene& scene) {
@@ -73,9 +74,11 @@ class Drive {
   /// Known voxels at or behind a surface whose centres lie in this box of the map frame.
   std::size_t solid_voxels_in(const Eigen::Vector3d& low_W, const Eigen::Vector3d& high_W) const {
     std::size_t count = 0;
-    for_each_voxel([&](const Eigen::Vector3d& p, std::int16_t tsdf, std::uint16_t weight, std::uint32_t) {
-      count += weight > 0 && tsdf <= 0 && (p.array() > low_W.array()).all() && (p.array() < high_W.array()).all();
-    });
+    for_each_voxel(
+        [&](const Eigen::Vector3d& p, std::int16_t tsdf, std::uint16_t weight, std::uint32_t) {
+          count += weight > 0 && tsdf <= 0 && (p.array() > low_W.array()).all() &&
+                   (p.array() < high_W.array()).all();
+        });
     return count;
   }
 
@@ -91,7 +94,8 @@ class Drive {
       const VoxelBlock& block = *map.find(key);
       for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
         const Eigen::Vector3d index(8 * key.x + i % 8, 8 * key.y + i / 8 % 8, 8 * key.z + i / 64);
-        visit((index.array() + 0.5) * config_.map.voxel_size_m, block.tsdf[i], block.weight[i], block.owner[i]);
+        visit((index.array() + 0.5) * config_.map.voxel_size_m, block.tsdf[i], block.weight[i],
+              block.owner[i]);
       }
     }
   }
@@ -106,8 +110,8 @@ class Drive {
 inline std::string text(const std::vector<ObjectEvent>& events) {
   std::string out;
   for (const ObjectEvent& e : events) {
-    out += std::string(to_string(e.kind)) + " " + std::to_string(to_index(e.object)) + " in frame " +
-           std::to_string(e.frame_sequence) + " by " + e.evidence.rule + "\n";
+    out += std::string(to_string(e.kind)) + " " + std::to_string(to_index(e.object)) +
+           " in frame " + std::to_string(e.frame_sequence) + " by " + e.evidence.rule + "\n";
   }
   return out;
 }

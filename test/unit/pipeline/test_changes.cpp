@@ -43,7 +43,8 @@ TEST(PipelineChanges, SequenceNumbersHaveNoGaps) {
   drive.watch(room_with({left_box(), right_cage()}), kLearn);
   drive.watch(room_with({right_cage()}), kLearn);
   ASSERT_GE(drive.events().size(), 3u);
-  for (std::size_t i = 0; i < drive.events().size(); ++i) EXPECT_EQ(drive.events()[i].sequence, i + 1);
+  for (std::size_t i = 0; i < drive.events().size(); ++i)
+    EXPECT_EQ(drive.events()[i].sequence, i + 1);
 }
 
 TEST(PipelineChanges, RemovedBoxIsReportedAndItsVoxelsAreGone) {
@@ -111,7 +112,8 @@ TEST(PipelineChanges, MovedBoxKeepsItsIdentityAndNamesBothPlaces) {
   ASSERT_TRUE(now);
   EXPECT_EQ(now->id, box->id);
   EXPECT_EQ(now->first_seen_ns, box->first_seen_ns) << "it is as old as before";
-  EXPECT_EQ(drive.solid_voxels_in({-0.86, 2.14, 0.1}, {-0.6, 2.46, 0.56}), 0u) << "where it was alone";
+  EXPECT_EQ(drive.solid_voxels_in({-0.86, 2.14, 0.1}, {-0.6, 2.46, 0.56}), 0u)
+      << "where it was alone";
 }
 
 TEST(PipelineChanges, SmallMoveIsOneToo) {

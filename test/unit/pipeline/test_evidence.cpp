@@ -30,7 +30,8 @@ std::vector<ObjectEvent> events_of_a_drive(const PipelineConfig& config) {
   Scenario scenario =
       load_scenario(std::filesystem::path(POCD_SOURCE_DIR) / "config/sim/shifted.yaml");
   CameraModel& camera = scenario.camera;
-  camera = {camera.width / 2, camera.height / 2, camera.fx / 2, camera.fy / 2, camera.cx / 2, camera.cy / 2};
+  camera = {camera.width / 2, camera.height / 2, camera.fx / 2,
+            camera.fy / 2,    camera.cx / 2,     camera.cy / 2};
   scenario.frame_rate_hz /= 2;
   SimReaderOptions options;
   options.with_color = false;
@@ -64,8 +65,10 @@ TEST(Evidence, GivesTheBeliefAfterItOverAWholeRun) {
     EXPECT_NEAR(evidence.c1 + evidence.c2, 1.0, 1e-12);
     EXPECT_FALSE(evidence.rule.empty());
     // And the weight k by the rule.
-    const Measurement z{evidence.delta_m, evidence.stationarity_class, evidence.measurement_sigma_m, 0.0};
-    EXPECT_EQ(evidence.k, adaptive_k(evidence.before, z, config.change.delta_max_m, config.state.k));
+    const Measurement z{evidence.delta_m, evidence.stationarity_class, evidence.measurement_sigma_m,
+                        0.0};
+    EXPECT_EQ(evidence.k,
+              adaptive_k(evidence.before, z, config.change.delta_max_m, config.state.k));
     ++recomputed[e.kind];
   }
   // The run must have shown what it is about: additions, and things that went or moved.

@@ -30,7 +30,9 @@ void expect_nothing_removed_or_moved(const Drive& drive) {
 
 TEST(PipelineNoChange, StaticSceneWithNoise) {
   Drive drive;
-  drive.watch(room_with({left_box(), right_cage(), solid(kBoxClass, {-0.1, 2.9}, {0.4, 0.3, 1.1}, 0.5)}), 100);
+  drive.watch(
+      room_with({left_box(), right_cage(), solid(kBoxClass, {-0.1, 2.9}, {0.4, 0.3, 1.1}, 0.5)}),
+      100);
   expect_nothing_removed_or_moved(drive);
   EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 3u) << text(drive.events());
   for (const ObjectSnapshot& o : drive.pipeline().objects()) {
@@ -40,13 +42,15 @@ TEST(PipelineNoChange, StaticSceneWithNoise) {
 }
 
 TEST(PipelineNoChange, LocalisationThatWanders) {
-  // Errors of 2 cm and 0.3 degrees that change within seconds, as the shipped sensor model has them.
+  // Errors of 2 cm and 0.3 degrees that change within seconds, as the shipped sensor model has
+  // them.
   Drive drive;
   const Scene scene = furnished();
   for (int i = 0; i < 100; ++i) {
     Frame frame = drive.next_frame(scene);
     const double t = 0.1 * i;
-    frame.T_W_C.pretranslate(Eigen::Vector3d(0.02 * std::sin(t), 0.02 * std::cos(1.3 * t), 0.005 * std::sin(0.7 * t)));
+    frame.T_W_C.pretranslate(
+        Eigen::Vector3d(0.02 * std::sin(t), 0.02 * std::cos(1.3 * t), 0.005 * std::sin(0.7 * t)));
     frame.T_W_C.rotate(Eigen::AngleAxisd(0.005 * std::sin(0.9 * t), Eigen::Vector3d::UnitY()));
     drive.process(frame);
   }
@@ -113,7 +117,8 @@ TEST(PipelineNoChange, AliasedMasksAreOneThing) {
   const Scene scene = room_with({solid(kFenceClass, {0, 2.6}, {1.6, 0.1, 1.2})});
   for (int i = 0; i < 60; ++i) {
     Frame frame = drive.next_frame(scene);
-    // The label flickers between the two indices of the fence, in half of the picture or in all of it.
+    // The label flickers between the two indices of the fence, in half of the picture or in all of
+    // it.
     for (int v = 0; v < frame.labels.rows; ++v) {
       for (int u = 0; u < frame.labels.cols; ++u) {
         auto& label = frame.labels.at<std::uint16_t>(v, u);
@@ -164,7 +169,8 @@ TEST(PipelineNoChange, SpikeOfThePoseIsRefusedAsAWhole) {
   EXPECT_TRUE(drive.pipeline().map().take_dirty().empty()) << "the map is untouched";
   const auto after = drive.pipeline().objects();
   ASSERT_EQ(after.size(), before.size());
-  for (std::size_t i = 0; i < after.size(); ++i) EXPECT_EQ(after[i].belief.alpha, before[i].belief.alpha);
+  for (std::size_t i = 0; i < after.size(); ++i)
+    EXPECT_EQ(after[i].belief.alpha, before[i].belief.alpha);
   EXPECT_TRUE(drive.process(drive.next_frame(furnished())).accepted);
 }
 

@@ -9,7 +9,8 @@ constexpr StampNs kPeriod_ns = 66'666'667;
 
 class PoseGateTest : public ::testing::Test {
  protected:
-  std::optional<std::string> show(int i, double x_m, double yaw_deg = 0.0, const std::string& robot = "r1") {
+  std::optional<std::string> show(int i, double x_m, double yaw_deg = 0.0,
+                                  const std::string& robot = "r1") {
     Frame frame;
     frame.robot = robot;
     frame.stamp_ns = 1'000'000'000 + i * kPeriod_ns;
@@ -73,7 +74,8 @@ TEST_F(PoseGateTest, JumpsThatDisagreeAreNeverAccepted) {
 
 TEST_F(PoseGateTest, GoodPosesBetweenJumpsRestartTheCount) {
   ASSERT_FALSE(show(0, 0.0));
-  for (int i = 1; i < 200; ++i) EXPECT_EQ(show(i, i % 10 ? 40.0 : 0.0).has_value(), i % 10 != 0) << i;
+  for (int i = 1; i < 200; ++i)
+    EXPECT_EQ(show(i, i % 10 ? 40.0 : 0.0).has_value(), i % 10 != 0) << i;
 }
 
 TEST_F(PoseGateTest, RobotsAreJudgedApart) {

@@ -32,16 +32,17 @@ class PoseRefinement : public ::testing::Test {
     test::add_noise(frame, config_.depth_noise, 5);
     frame.T_W_C = error * frame.T_W_C;
     ThreadPool pool(1);
-    organize(frame, 2, config_.map.max_depth_m, config_.classes, ClassTable(config_.classes), pool, cloud_);
-    return refine_pose(cloud_, library_, config_.map.max_depth_m, config_.depth_noise, config_.pose_refinement);
+    organize(frame, 2, config_.map.max_depth_m, config_.classes, ClassTable(config_.classes), pool,
+             cloud_);
+    return refine_pose(cloud_, library_, config_.map.max_depth_m, config_.depth_noise,
+                       config_.pose_refinement);
   }
 
-  static Pose shift(double x, double y, double z) {
-    return Pose(Eigen::Translation3d(x, y, z));
-  }
+  static Pose shift(double x, double y, double z) { return Pose(Eigen::Translation3d(x, y, z)); }
 
   const Eigen::Vector3d size_{0.6, 0.4, 0.6};
-  const Scene scene_ = room_with({solid(kBoxClass, {-0.6, 2.2}, size_, 0.5), solid(kBoxClass, {0.6, 2.4}, size_, -0.4)});
+  const Scene scene_ = room_with(
+      {solid(kBoxClass, {-0.6, 2.2}, size_, 0.5), solid(kBoxClass, {0.6, 2.4}, size_, -0.4)});
   const Pose T_W_C_ = test::look_from({0, 0, 1.1});
   PipelineConfig config_ = test::room_config();
   ObjectLibrary library_;
@@ -75,15 +76,16 @@ TEST_F(PoseRefinement, CorrectionMovesPoseAndPointsTogether) {
   apply_correction(*correction, cloud_);
   EXPECT_TRUE(cloud_.T_W_C.isApprox(*correction * T_before));
   // Single precision.
-  EXPECT_LT((cloud_.point_W(5000).cast<double>() - *correction * before.cast<double>()).norm(), 1e-5);
+  EXPECT_LT((cloud_.point_W(5000).cast<double>() - *correction * before.cast<double>()).norm(),
+            1e-5);
 }
 
 TEST_F(PoseRefinement, OneMovedThingDoesNotPullThePose) {
   // The left box came 30 cm nearer; the right one tells where the camera is.
   config_.pose_refinement.min_points = 50;
-  const auto correction = refined(
-      room_with({solid(kBoxClass, {-0.6, 1.9}, size_, 0.5), solid(kBoxClass, {0.6, 2.4}, size_, -0.4)}),
-      Pose::Identity());
+  const auto correction = refined(room_with({solid(kBoxClass, {-0.6, 1.9}, size_, 0.5),
+                                             solid(kBoxClass, {0.6, 2.4}, size_, -0.4)}),
+                                  Pose::Identity());
   if (correction) {
     EXPECT_LT((*correction * T_W_C_.translation() - T_W_C_.translation()).norm(), 0.015);
   }

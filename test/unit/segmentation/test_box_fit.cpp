@@ -18,7 +18,8 @@ double half_turn_apart(double a, double b) { return std::abs(std::remainder(a - 
 double quarter_turn_apart(double a, double b) { return std::abs(std::remainder(a - b, M_PI / 2)); }
 
 /// What a camera sees of an upright box: the front and, if wanted, one side and the top.
-Cloud view_of_box(Random& random, const Eigen::Vector3d& size, bool side, bool top, double noise_m) {
+Cloud view_of_box(Random& random, const Eigen::Vector3d& size, bool side, bool top,
+                  double noise_m) {
   const Eigen::Vector3d x(size.x(), 0, 0), y(0, size.y(), 0), z(0, 0, size.z());
   const Eigen::Vector3d corner = -0.5 * (x + y);
   Cloud cloud;
@@ -30,14 +31,15 @@ Cloud view_of_box(Random& random, const Eigen::Vector3d& size, bool side, bool t
   return cloud;
 }
 
-Cloud turned(const Cloud& cloud, double yaw_rad, const Eigen::Vector3d& position_W, Random* noise = nullptr,
-             double normal_noise_rad = 0.0) {
+Cloud turned(const Cloud& cloud, double yaw_rad, const Eigen::Vector3d& position_W,
+             Random* noise = nullptr, double normal_noise_rad = 0.0) {
   const Eigen::Matrix3d R = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   Cloud out;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     Eigen::Vector3d normal = R * cloud.normals[i].cast<double>();
     if (noise) {
-      normal += normal_noise_rad * Eigen::Vector3d(noise->normal(), noise->normal(), noise->normal());
+      normal +=
+          normal_noise_rad * Eigen::Vector3d(noise->normal(), noise->normal(), noise->normal());
       normal.normalize();
     }
     out.add(R * cloud.points[i].cast<double>() + position_W, normal);
@@ -45,17 +47,22 @@ Cloud turned(const Cloud& cloud, double yaw_rad, const Eigen::Vector3d& position
   return out;
 }
 
-Points no_normals(const Cloud& cloud) { return Points(cloud.points.size(), Eigen::Vector3f::Zero()); }
+Points no_normals(const Cloud& cloud) {
+  return Points(cloud.points.size(), Eigen::Vector3f::Zero());
+}
 
 TEST(FitBox, LShapedViewsAtAnyHeading) {
   Random random(11);
   for (int i = 0; i < 100; ++i) {
-    const Eigen::Vector3d size(random.uniform(0.6, 1.5), random.uniform(0.25, 0.5), random.uniform(0.4, 1.5));
+    const Eigen::Vector3d size(random.uniform(0.6, 1.5), random.uniform(0.25, 0.5),
+                               random.uniform(0.4, 1.5));
     const double yaw = random.uniform(-M_PI, M_PI);
     const Eigen::Vector3d at(random.uniform(-50, 50), random.uniform(-50, 50), 0.0);
-    const Cloud view = turned(view_of_box(random, size, true, i % 2 == 0, 0.01), yaw, at, &random, 0.05);
+    const Cloud view =
+        turned(view_of_box(random, size, true, i % 2 == 0, 0.01), yaw, at, &random, 0.05);
     const OrientedBox box = fit_box(view.points, view.normals, 0.005);
-    // The mean of some hundred normals, each off by 3 degrees: below half a degree; one is asked for.
+    // The mean of some hundred normals, each off by 3 degrees: below half a degree; one is asked
+    // for.
     EXPECT_LT(half_turn_apart(box.pose.yaw_rad, yaw), M_PI / 180) << i;
     // 1 cm of noise, of which the trim leaves up to three sigma on either side, and one degree over
     // half a metre or more.
@@ -70,8 +77,11 @@ TEST(FitBox, HeadingOfASquareIsItsSides) {
   Random random(12);
   for (int i = 0; i < 50; ++i) {
     const double yaw = random.uniform(-M_PI, M_PI);
-    const Cloud view = turned(view_of_box(random, {0.5, 0.5, 2.0}, true, false, 0.01), yaw, {3, 4, 0}, &random, 0.05);
-    EXPECT_LT(quarter_turn_apart(fit_box(view.points, view.normals, 0.005).pose.yaw_rad, yaw), M_PI / 180) << i;
+    const Cloud view = turned(view_of_box(random, {0.5, 0.5, 2.0}, true, false, 0.01), yaw,
+                              {3, 4, 0}, &random, 0.05);
+    EXPECT_LT(quarter_turn_apart(fit_box(view.points, view.normals, 0.005).pose.yaw_rad, yaw),
+              M_PI / 180)
+        << i;
   }
 }
 
@@ -79,7 +89,8 @@ TEST(FitBox, OneFaceAloneGivesItsHeading) {
   Random random(13);
   for (int i = 0; i < 50; ++i) {
     const double yaw = random.uniform(-M_PI, M_PI);
-    const Cloud view = turned(view_of_box(random, {1.0, 0.4, 0.8}, false, false, 0.005), yaw, {0, 0, 0}, &random, 0.05);
+    const Cloud view = turned(view_of_box(random, {1.0, 0.4, 0.8}, false, false, 0.005), yaw,
+                              {0, 0, 0}, &random, 0.05);
     const OrientedBox box = fit_box(view.points, view.normals, 0.005);
     EXPECT_LT(half_turn_apart(box.pose.yaw_rad, yaw), M_PI / 180) << i;
     EXPECT_LT(box.size_m.y(), 0.05) << "nothing is known of its depth";
@@ -91,7 +102,8 @@ TEST(FitBox, WithoutNormalsTheLeastRectangleDecides) {
   for (int i = 0; i < 50; ++i) {
     const double yaw = random.uniform(-M_PI, M_PI);
     // The top is seen: the flattened points fill the rectangle, so that one rectangle is least.
-    const Cloud view = turned(view_of_box(random, {1.0, 0.4, 0.5}, true, true, 0.003), yaw, {10, -10, 0});
+    const Cloud view =
+        turned(view_of_box(random, {1.0, 0.4, 0.5}, true, true, 0.003), yaw, {10, -10, 0});
     const OrientedBox box = fit_box(view.points, no_normals(view), 0.005);
     // The hull's outermost points lie within 2 cm of 1 m: a degree or two.
     EXPECT_LT(half_turn_apart(box.pose.yaw_rad, yaw), 3 * M_PI / 180) << i;
@@ -103,8 +115,8 @@ TEST(FitBox, WithoutNormalsTheLeastRectangleDecides) {
 TEST(FitBox, LongerSideIsAlongTheHeading) {
   Random random(15);
   for (int i = 0; i < 20; ++i) {
-    const Cloud view = turned(view_of_box(random, {0.4, 1.2, 0.5}, true, true, 0.003), random.uniform(-M_PI, M_PI),
-                              {0, 0, 0});
+    const Cloud view = turned(view_of_box(random, {0.4, 1.2, 0.5}, true, true, 0.003),
+                              random.uniform(-M_PI, M_PI), {0, 0, 0});
     for (const Points& normals : {view.normals, no_normals(view)}) {
       const OrientedBox box = fit_box(view.points, normals, 0.005);
       EXPECT_GE(box.size_m.x(), box.size_m.y());
@@ -137,7 +149,8 @@ TEST(FitBoxPca, HeadingIsTheMajorAxis) {
   Random random(17);
   for (int i = 0; i < 50; ++i) {
     const double yaw = random.uniform(-M_PI, M_PI);
-    const Cloud view = turned(test::box_cloud(random, 3000, {-0.6, -0.2, 0}, {1.2, 0.4, 0.6}), yaw, {5, 5, 0});
+    const Cloud view =
+        turned(test::box_cloud(random, 3000, {-0.6, -0.2, 0}, {1.2, 0.4, 0.6}), yaw, {5, 5, 0});
     // 3000 random points: the axis of 1.2 m x 0.4 m is uncertain by a degree; three of them.
     EXPECT_LT(half_turn_apart(fit_box_pca(view.points).pose.yaw_rad, yaw), 3 * M_PI / 180) << i;
   }
@@ -146,9 +159,11 @@ TEST(FitBoxPca, HeadingIsTheMajorAxis) {
 TEST(FitBoxPca, IsBiasedOnLShapedViewsWhereNormalsAreNot) {
   // Why headings come from normals: the two visible sides of a box make a skew L.
   Random random(18);
-  const Cloud view = turned(view_of_box(random, {0.8, 0.6, 1.0}, true, false, 0.005), 0.3, {0, 0, 0});
+  const Cloud view =
+      turned(view_of_box(random, {0.8, 0.6, 1.0}, true, false, 0.005), 0.3, {0, 0, 0});
   EXPECT_GT(quarter_turn_apart(fit_box_pca(view.points).pose.yaw_rad, 0.3), 10 * M_PI / 180);
-  EXPECT_LT(quarter_turn_apart(fit_box(view.points, view.normals, 0.005).pose.yaw_rad, 0.3), M_PI / 180);
+  EXPECT_LT(quarter_turn_apart(fit_box(view.points, view.normals, 0.005).pose.yaw_rad, 0.3),
+            M_PI / 180);
 }
 
 }  // namespace

@@ -41,8 +41,8 @@ TEST(ClassMap, NamesEveryBrokenRule) {
   ClassMap map = test::room_classes();
   EXPECT_TRUE(map.inconsistencies().empty());
   map.list[1].rgb = "1,2,3";
-  map.list[2].rgb = "1, 2, 3";    // the same colour
-  map.list[3].rgb = "1,2,256";    // none
+  map.list[2].rgb = "1, 2, 3";  // the same colour
+  map.list[3].rgb = "1,2,256";  // none
   map.list[5].id = map.list[0].id;
   const auto problems = map.inconsistencies();
   ASSERT_EQ(problems.size(), 3u);

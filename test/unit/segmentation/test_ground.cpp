@@ -23,9 +23,7 @@ OrganizedCloud grounded(const Frame& frame, const PipelineConfig& config, Ground
   return cloud;
 }
 
-Scene with_table() {
-  return test::room_with({test::solid(kBoxClass, {0, 2.0}, {1.2, 0.8, 0.7})});
-}
+Scene with_table() { return test::room_with({test::solid(kBoxClass, {0, 2.0}, {1.2, 0.8, 0.7})}); }
 
 /// So near above the table that its top and the wall fill the picture.
 Pose over_the_table() { return test::look_from({0, 1.3, 1.2}, 0.0, 0.75); }
@@ -132,7 +130,8 @@ TEST(Ground, UnknownGroundLeavesKindsAlone) {
 
 TEST(Ground, DynamicPixelsOfTheBandStayDynamic) {
   const PipelineConfig config = test::room_config();
-  const Scene scene = test::room_with({test::solid(test::kPersonClass, {0, 2.0}, {0.6, 0.6, 0.04})});
+  const Scene scene =
+      test::room_with({test::solid(test::kPersonClass, {0, 2.0}, {0.6, 0.6, 0.04})});
   GroundModel ground;
   const OrganizedCloud cloud = grounded(test::shoot(scene, overview()), config, ground);
   EXPECT_EQ(cloud.kind[test::pixel_of(cloud, {0.0, 2.0, 0.04})], PixelKind::kDynamic);

@@ -23,7 +23,8 @@ std::int32_t observation_at(const Segmented& s, const Eigen::Vector3d& point_W) 
 }
 
 TEST(Observations, EmptyRoomHasNone) {
-  EXPECT_TRUE(segment(shoot(room_with({}), viewpoint()), test::room_config()).observations.list.empty());
+  EXPECT_TRUE(
+      segment(shoot(room_with({}), viewpoint()), test::room_config()).observations.list.empty());
 }
 
 TEST(Observations, TwoBoxesAreTwo) {
@@ -39,8 +40,9 @@ TEST(Observations, TwoBoxesAreTwo) {
   EXPECT_NE(left, right);
   const Observation& observation = s.observations.list[left];
   EXPECT_EQ(observation.class_id, kBoxClass);
-  // Front and top are seen; the back is known as far as the top reaches it. A grid pixel at 2.2 m is
-  // 17 mm, seen from both sides: 4 cm. The foot is within the ground band of 6 cm plus one sigma.
+  // Front and top are seen; the back is known as far as the top reaches it. A grid pixel at 2.2 m
+  // is 17 mm, seen from both sides: 4 cm. The foot is within the ground band of 6 cm plus one
+  // sigma.
   EXPECT_NEAR(observation.box.pose.position_W.x(), -0.6, 0.04);
   EXPECT_NEAR(observation.box.pose.position_W.y(), 2.2, 0.04);
   EXPECT_NEAR(observation.box.size_m.x(), 0.5, 0.05);
@@ -49,10 +51,11 @@ TEST(Observations, TwoBoxesAreTwo) {
 }
 
 TEST(Observations, TouchingBoxesOfTwoClassesAreTwo) {
-  const Segmented s = segment(shoot(room_with({solid(kBoxClass, {-0.25, 2.2}, {0.5, 0.4, 0.6}),
-                                               solid(kCageClass, {0.25, 2.2}, {0.5, 0.4, 0.6}, 0.15)}),
-                                    viewpoint()),
-                              test::room_config());
+  const Segmented s =
+      segment(shoot(room_with({solid(kBoxClass, {-0.25, 2.2}, {0.5, 0.4, 0.6}),
+                               solid(kCageClass, {0.25, 2.2}, {0.5, 0.4, 0.6}, 0.15)}),
+                    viewpoint()),
+              test::room_config());
   ASSERT_EQ(s.observations.list.size(), 2u);
   EXPECT_NE(s.observations.list[0].class_id, s.observations.list[1].class_id);
 }
@@ -67,13 +70,15 @@ TEST(Observations, InstancesOfOneClassStayApart) {
   for (int v = 0; v < frame.labels.rows; ++v) {
     for (int u = 0; u < frame.labels.cols; ++u) {
       auto& label = frame.labels.at<std::uint16_t>(v, u);
-      label = static_cast<std::uint16_t>(label * 100 + (label == kBoxClass ? 1 + (u >= border) : 0));
+      label =
+          static_cast<std::uint16_t>(label * 100 + (label == kBoxClass ? 1 + (u >= border) : 0));
     }
   }
   EXPECT_EQ(segment(frame, config).observations.list.size(), 2u);
 }
 
-/// A bar of another class before the middle of a long box, upright or leaning; where the box is cut.
+/// A bar of another class before the middle of a long box, upright or leaning; where the box is
+/// cut.
 Segmented cut_by_a_bar(double lean_rad) {
   SceneObject bar = solid(kCageClass, {0, 1.8}, {0.12, 0.12, 2.6});
   bar.parts[0].T_O_P = Eigen::Translation3d(0, 0, 0.55) *
@@ -105,15 +110,18 @@ TEST(Observations, PiecesThatDoNotOverlapStayApart) {
 }
 
 TEST(Observations, PersonAndWallAndFloorAreNone) {
-  const Segmented s = segment(
-      shoot(room_with({solid(kPersonClass, {0, 2.2}, {0.4, 0.4, 1.6})}), viewpoint()), test::room_config());
+  const Segmented s =
+      segment(shoot(room_with({solid(kPersonClass, {0, 2.2}, {0.4, 0.4, 1.6})}), viewpoint()),
+              test::room_config());
   EXPECT_TRUE(s.observations.list.empty());
 }
 
 TEST(Observations, SmallClustersAreDropped) {
   PipelineConfig config = test::room_config();
-  // 12 cm x 12 cm x 20 cm at 2.2 m: front of 12 cm x 14 cm above the band, and a top seen from above.
-  const Frame frame = shoot(room_with({solid(kBoxClass, {0, 2.2}, {0.12, 0.12, 0.2})}), viewpoint());
+  // 12 cm x 12 cm x 20 cm at 2.2 m: front of 12 cm x 14 cm above the band, and a top seen from
+  // above.
+  const Frame frame =
+      shoot(room_with({solid(kBoxClass, {0, 2.2}, {0.12, 0.12, 0.2})}), viewpoint());
   config.segmentation.min_cluster_area_m2 = 0.05;
   EXPECT_TRUE(segment(frame, config).observations.list.empty());
   config.segmentation.min_cluster_area_m2 = 0.005;
@@ -147,8 +155,9 @@ TEST(Observations, PointsLieOnTheSurfaceWithNormalsTowardsTheCamera) {
 }
 
 TEST(Observations, FootInTheGroundBandBelongsToTheThing) {
-  const Segmented s = segment(
-      shoot(room_with({solid(kBoxClass, {0, 2.2}, {0.6, 0.4, 0.6})}), viewpoint()), test::room_config());
+  const Segmented s =
+      segment(shoot(room_with({solid(kBoxClass, {0, 2.2}, {0.6, 0.4, 0.6})}), viewpoint()),
+              test::room_config());
   ASSERT_EQ(s.observations.list.size(), 1u);
   EXPECT_EQ(observation_at(s, {0, 2.0, 0.03}), 0) << "its front, 3 cm above the floor";
   EXPECT_EQ(observation_at(s, {0, 1.9, 0.0}), Observations::kNone) << "the floor before it";

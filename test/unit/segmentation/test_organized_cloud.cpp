@@ -99,9 +99,9 @@ TEST(Organize, WithoutMasksEverythingIsTheDefaultClass) {
 }
 
 TEST(Organize, SameForEveryThreadCountAndForReusedMemory) {
-  const Frame frame = test::shoot(
-      test::room_with({test::solid(test::kBoxClass, {0, 2.2}, {0.5, 0.4, 0.6}, 0.3)}),
-      test::look_from({0, 0, 1}));
+  const Frame frame =
+      test::shoot(test::room_with({test::solid(test::kBoxClass, {0, 2.2}, {0.5, 0.4, 0.6}, 0.3)}),
+                  test::look_from({0, 0, 1}));
   const ClassMap classes = test::room_classes();
   const OrganizedCloud expected = organized(frame, 2, classes);
   for (const int threads : {2, 3}) {

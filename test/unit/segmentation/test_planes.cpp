@@ -76,8 +76,10 @@ TEST(SegmentPlanes, SidesOfABoxAreDifferentPlanes) {
       test::shoot(test::room_with({test::solid(kBoxClass, {0, 2.0}, {0.8, 0.8, 0.8}, yaw)}),
                   test::look_from({0, 0, 1.3}, 0.0, 0.4));
   const Planes result = planes_of(frame, config);
-  const Eigen::Vector3f left(static_cast<float>(-std::cos(yaw)), static_cast<float>(-std::sin(yaw)), 0);
-  const Eigen::Vector3f right(static_cast<float>(std::sin(yaw)), static_cast<float>(-std::cos(yaw)), 0);
+  const Eigen::Vector3f left(static_cast<float>(-std::cos(yaw)), static_cast<float>(-std::sin(yaw)),
+                             0);
+  const Eigen::Vector3f right(static_cast<float>(std::sin(yaw)), static_cast<float>(-std::cos(yaw)),
+                              0);
   EXPECT_NE(largest_with_normal(result.planes, left), nullptr);
   EXPECT_NE(largest_with_normal(result.planes, right), nullptr);
 }
@@ -85,9 +87,10 @@ TEST(SegmentPlanes, SidesOfABoxAreDifferentPlanes) {
 TEST(SegmentPlanes, SmallStepsMakeTwoPlanes) {
   // Two boxes side by side, one of them 15 cm farther: more than tolerance and noise together.
   const PipelineConfig config = test::room_config();
-  const Frame frame = test::shoot(test::room_with({test::solid(kBoxClass, {-0.5, 2.0}, {1, 0.4, 1}),
-                                                   test::solid(kBoxClass, {0.5, 2.15}, {1, 0.4, 1})}),
-                                  test::look_from({0, 0, 0.6}, 0.0, 0.0));
+  const Frame frame =
+      test::shoot(test::room_with({test::solid(kBoxClass, {-0.5, 2.0}, {1, 0.4, 1}),
+                                   test::solid(kBoxClass, {0.5, 2.15}, {1, 0.4, 1})}),
+                  test::look_from({0, 0, 0.6}, 0.0, 0.0));
   const Planes result = planes_of(frame, config);
   const auto plane_at = [&](double x, double y) {
     return result.planes.plane_of[test::pixel_of(result.cloud, {x, y, 0.6})];

@@ -19,7 +19,8 @@ LibraryObject known_object(int stationarity_class = 0) {
   object.belief = {0.0, 0.1, 8.0, 2.0};
   std::vector<SurfacePoint> points;
   for (int i = 0; i < 100; ++i) {
-    points.push_back({{0.05f * static_cast<float>(i % 10) + 0.02f, 0.05f * static_cast<float>(i / 10) + 0.02f, 0.02f},
+    points.push_back({{0.05f * static_cast<float>(i % 10) + 0.02f,
+                       0.05f * static_cast<float>(i / 10) + 0.02f, 0.02f},
                       {0, 0, 1},
                       0.01f});
   }
@@ -38,8 +39,8 @@ OrientedBox box_of(double x, double y, const Eigen::Vector3d& size_m) {
 Belief random_belief(Random& random) {
   const double count = std::exp(random.uniform(std::log(0.2), std::log(kState.max_count)));
   const double mean = random.uniform(0.02, 0.98);
-  return {random.uniform(-0.3, 0.3), std::exp(random.uniform(std::log(0.1), std::log(1.0))), mean * count,
-          (1 - mean) * count};
+  return {random.uniform(-0.3, 0.3), std::exp(random.uniform(std::log(0.1), std::log(1.0))),
+          mean * count, (1 - mean) * count};
 }
 
 TEST(ApplyMeasurement, EvidenceAloneGivesTheBeliefAfterIt) {
@@ -49,7 +50,8 @@ TEST(ApplyMeasurement, EvidenceAloneGivesTheBeliefAfterIt) {
     object.belief = random_belief(random);
     const double delta_m = random.uniform(-1.2, 1.2) * kChange.delta_max_m * (i % 2 ? 1.0 : 0.05);
     const Evidence e = apply_measurement(object, delta_m, {}, kState, kChange);
-    const Belief again = next_belief(e.before, e.delta_m, e.stationarity_class, e.k, kState, kChange);
+    const Belief again =
+        next_belief(e.before, e.delta_m, e.stationarity_class, e.k, kState, kChange);
     ASSERT_EQ(again.mu, e.after.mu);
     ASSERT_EQ(again.sigma, e.after.sigma);
     ASSERT_EQ(again.alpha, e.after.alpha);
@@ -79,7 +81,8 @@ TEST(ApplyMeasurement, KFollowsClassAndKind) {
     for (const double delta_m : {0.0, kChange.delta_max_m}) {
       LibraryObject object = known_object(s);
       const bool inlier = delta_m == 0.0;
-      EXPECT_EQ(apply_measurement(object, delta_m, {}, kState, kChange).k, inlier == (s == 1) ? kState.k : 0.0);
+      EXPECT_EQ(apply_measurement(object, delta_m, {}, kState, kChange).k,
+                inlier == (s == 1) ? kState.k : 0.0);
     }
   }
 }
@@ -92,7 +95,8 @@ TEST(NextBelief, IsTheBayesianStepWithItsBounds) {
     const int s = static_cast<int>(random.below(2));
     const double k = random.below(2) ? kState.k : 0.0;
     const double delta_m = random.uniform(-0.3, 0.3);
-    const Belief plain = bayesian_update(before, {delta_m, s, kChange.tau_m, k}, kChange.delta_max_m).belief;
+    const Belief plain =
+        bayesian_update(before, {delta_m, s, kChange.tau_m, k}, kChange.delta_max_m).belief;
     const Belief after = next_belief(before, delta_m, s, k, kState, kChange);
     ASSERT_LE(after.alpha + after.beta, kState.max_count * (1 + 1e-12));
     ASSERT_GE(after.sigma, kState.min_sigma_share * kChange.tau_m);
@@ -113,7 +117,8 @@ TEST(NextBelief, UpdateAboveVMaxIsNotApplied) {
   EXPECT_EQ(after.mu, before.mu);
   EXPECT_EQ(after.sigma, before.sigma);
   // What lowers it is applied from there all the same.
-  EXPECT_LT(next_belief(before, kChange.delta_max_m, 0, 3.0, state, kChange).stationarity(), before.stationarity());
+  EXPECT_LT(next_belief(before, kChange.delta_max_m, 0, 3.0, state, kChange).stationarity(),
+            before.stationarity());
 }
 
 TEST(RemovalRule, NoneForAHealthyObject) {
@@ -134,7 +139,8 @@ TEST(RemovalRule, ChangeEstablished) {
   LibraryObject object = known_object();
   object.belief.mu = -kChange.tau_m;
   object.belief.sigma = 0.5 * kChange.tau_m;
-  EXPECT_EQ(removal_rule(object, kState, kChange), "change_established") << "the sign does not matter";
+  EXPECT_EQ(removal_rule(object, kState, kChange), "change_established")
+      << "the sign does not matter";
   object.belief.sigma = 1.1 * kChange.tau_m;
   EXPECT_FALSE(removal_rule(object, kState, kChange)) << "not sure enough";
   object.belief.sigma = 0.1 * kChange.tau_m;
@@ -175,7 +181,8 @@ TEST(Alike, SizesWithinAThirdWhicheverWayTheyLie) {
   EXPECT_FALSE(alike(a, box_of(0, 0, {0.6, 0.5, 0.8}), 0.0));
   EXPECT_FALSE(alike(a, box_of(0, 0, {1.0, 0.5, 0.4}), 0.0)) << "height counts for itself";
   EXPECT_TRUE(alike(a, box_of(0, 0, {1.0, 0.5, 0.4}), 0.45)) << "within the slack";
-  EXPECT_FALSE(alike(box_of(0, 0, {1, 1, 2}), box_of(0, 0, {2, 1, 1}), 0.0)) << "lying is not standing";
+  EXPECT_FALSE(alike(box_of(0, 0, {1, 1, 2}), box_of(0, 0, {2, 1, 1}), 0.0))
+      << "lying is not standing";
 }
 
 TEST(FitsInside, PartsOfAnySizeButNothingLarger) {
@@ -194,7 +201,8 @@ class Relocation : public ::testing::Test {
     memory_.remember({ObjectId{id}, class_id, box, 5, static_cast<StampNs>(at_s) * kSecond});
   }
   std::optional<ObjectId> find(ClassId class_id, const OrientedBox& box, double at_s) {
-    const auto* found = memory_.find(class_id, box, static_cast<StampNs>(at_s) * kSecond, 60.0, 2.5, 0.15);
+    const auto* found =
+        memory_.find(class_id, box, static_cast<StampNs>(at_s) * kSecond, 60.0, 2.5, 0.15);
     return found ? std::optional(found->id) : std::nullopt;
   }
   const Eigen::Vector3d size_{1.0, 0.5, 0.8};
