@@ -182,7 +182,8 @@ TEST(RecordReplay, UnknownTypesPartitionsAndDisposesComeBack) {
   ASSERT_GE(changes.size(), first["keyed/_instances"].size());
   changes.resize(first["keyed/_instances"].size());
   for (const auto& [topic, list] : first) {
-    EXPECT_TRUE(list == second[topic]) << topic << ": " << list.size() << " became " << second[topic].size();
+    EXPECT_TRUE(list == second[topic])
+        << topic << ": " << list.size() << " became " << second[topic].size();
   }
   std::map<std::string, const recording::RecordedChannel*> channels;
   for (const auto& channel : reader->channels()) channels[channel.topic] = &channel;

@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# Records a short simulated run with all of the component's topics, and has other people's readers
+# decode it. usage: run.sh BIN_DIR WORK_DIR. Exit code 77: skipped, there is no npm or no network.
+set -euo pipefail
+
+bin=$1 work=$2
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+if ! command -v npm >/dev/null || ! command -v node >/dev/null; then
+  echo "interop: skipped, npm and node are not installed"
+  exit 77
+fi
+mkdir -p "$work"
+cp "$here/package.json" "$here/check.js" "$work"
+cd "$work"
+if ! npm install --no-audit --no-fund --loglevel=error >npm.log 2>&1; then
+  echo "interop: skipped, npm cannot fetch its packages:"
+  tail -n 3 npm.log
+  exit 77
+fi
+
+export ROS_DOMAIN_ID=${POCD_INTEROP_DOMAIN:-87} SKIP_DEFAULT_XML=1
+pids=()
+trap '((${#pids[@]} == 0)) || kill "${pids[@]}" 2>/dev/null || true' EXIT
+# Waits for a line in a log: the processes say when they are ready.
+wait_for() {
+  for _ in $(seq 600); do
+    grep -q "$1" "$2" && return 0
+    sleep 0.1
+  done
+  echo "interop: no '$1' in $2:"
+  cat "$2"
+  exit 1
+}
+rm -f run.mcap
+"$bin/pocd_record" --output run.mcap >record.log 2>&1 &
+recorder=$!
+pids+=("$recorder")
+wait_for "recording on domain" record.log
+"$bin/pocd_node" --config "$here/../../config/simulated.yaml" --robot robot1 --robot robot2 \
+  --set node.visual_period_s=0.2 >node.log 2>&1 &
+node_pid=$!
+pids+=("$node_pid")
+wait_for "recording /pocd/objects/markers" record.log
+"$bin/pocd_play" --dataset sim --input "$here/../../config/sim/demo.yaml" --max-frames 60 --clock \
+  >play.log 2>&1 || { cat play.log; exit 1; }
+kill -TERM "$node_pid" && wait "$node_pid" || { cat node.log; exit 1; }
+kill -TERM "$recorder" && wait "$recorder" || { cat record.log; exit 1; }
+pids=()
+"$bin/pocd_info" --verify run.mcap
+node check.js run.mcap | tee check.log
+for topic in /robot1/depth/image_raw /robot1/segmentation /robot1/odom /robot2/depth/camera_info \
+  /tf_static /clock pocd/map/tiles pocd/map/deltas pocd/map/manifest pocd/health pocd/frames \
+  /diagnostics; do
+  grep -q "^$topic: " check.log || { echo "interop: $topic was not recorded"; exit 1; }
+done
