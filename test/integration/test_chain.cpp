@@ -15,10 +15,6 @@
 namespace pocd {
 namespace {
 
-// Makes the pipeline slower than the player, so that with a queue of one frame the player has to be
-// held back all the time.
-constexpr const char* kFineMap = "map.voxel_size_m=0.02";
-
 RunSummary offline(const std::string& input, const std::filesystem::path& output,
                    const std::vector<std::string>& more = {}) {
   std::vector<std::string> command{bin("pocd_map"),
@@ -88,14 +84,13 @@ class ObjectWatch {
 
 TEST(Chain, LiveEqualsOfflineAndRemovalIsDisposed) {
   const TemporaryFolder folder;
-  const RunSummary expected = offline(scenario(), folder.path() / "offline", {"--set", kFineMap});
+  const RunSummary expected = offline(scenario(), folder.path() / "offline");
   ASSERT_GT(expected.removed, 0u) << "the scenario has to have a removal to be a test";
   ASSERT_GT(expected.objects, 0u);
 
   const TestDomain domain;
   ObjectWatch objects(domain);
-  Process node(node_command(
-      domain, {"--lossless", "--epoch", "77", "--set", kFineMap, "--set", "node.queue_frames=1"}));
+  Process node(node_command(domain, {"--lossless", "--epoch", "77"}));
   ASSERT_TRUE(eventually([&] { return objects.matched(); }));
   const auto output = folder.path() / "mirror";
   Process mirror(
@@ -128,6 +123,26 @@ TEST(Chain, LiveEqualsOfflineAndRemovalIsDisposed) {
     EXPECT_EQ(key, dds::object_uuid(77, ObjectId{state.local_id()}));
     EXPECT_EQ(state.class_name(), "box");
   }
+}
+
+// A pipeline that is slower than the player and a queue of one frame: without being held back, the
+// player would make the node drop frames.
+TEST(Chain, LosslessHoldsThePlayerBack) {
+  const TemporaryFolder folder;
+  const std::vector<std::string> fine{"--set", "map.voxel_size_m=0.005"};
+  const RunSummary expected =
+      offline(scenario(), folder.path() / "offline", {fine[0], fine[1], "--max-frames", "25"});
+  const TestDomain domain;
+  Process node(
+      node_command(domain, {"--lossless", fine[0], fine[1], "--set", "node.queue_frames=1"}));
+  Process mirror({bin("pocd_mirror"), "--until-end", "--domain", domain.text()});
+  ASSERT_EQ(run_command(play_command(domain, {"--max-frames", "25"})).exit_code, 0);
+  node.signal(SIGINT);
+  const CommandResult ended = node.wait();
+  EXPECT_NE(ended.err.find("25 frames processed"), std::string::npos) << ended.err;
+  const CommandResult mirrored = mirror.wait();
+  EXPECT_NE(mirrored.out.find("digest " + expected.map_digest), std::string::npos)
+      << mirrored.out << mirrored.err << "offline " << expected.map_digest;
 }
 
 // Frames of two robots reach the pipeline in one order, whatever the order of arrival.
