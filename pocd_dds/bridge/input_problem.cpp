@@ -34,7 +34,6 @@ const char* to_string(InputReason reason) {
       return "stamp_backwards";
     case InputReason::kSizesDisagree:
       return "sizes_disagree";
-    case InputReason::kNotRectified:
       return "not_rectified";
   }
   return "";

@@ -24,7 +24,6 @@ enum class InputReason {
   kEmptyFrameName,
   kStampBackwards,
   kSizesDisagree,
-  kNotRectified,
 };
 const char* to_string(InputReason reason);  ///< "unknown_encoding", ...
 
