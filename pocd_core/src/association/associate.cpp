@@ -24,12 +24,13 @@ const Sighting::Touch* find_touch(const Sighting& sighting, std::int32_t observa
   return nullptr;
 }
 
-/// An object that is seen through by this share while its observation fits by less than kMismatchFit is
-/// in doubt: it turned, or something else took part of its place. Borders under pose error stay below.
+/// An object that is seen through by this share while its observation fits by less than
+/// kMismatchFit is in doubt: it turned, or something else took part of its place. Borders under
+/// pose error stay below.
 constexpr double kMismatchShare = 0.25;
 constexpr double kMismatchFit = 0.75;
-/// The same when its own observation covers it from the front; since an unseen part of an object may
-/// do that too, the object must be in view almost whole, and fit worse.
+/// The same when its own observation covers it from the front; since an unseen part of an object
+/// may do that too, the object must be in view almost whole, and fit worse.
 constexpr double kCoveredWhole = 0.7;
 constexpr double kCoveredFit = 0.5;
 
@@ -40,15 +41,18 @@ bool in_doubt(const Candidate& candidate, const Observations& observations) {
   int covered = 0;
   double fit = 0.0;
   const int suspects = s.seen_through + s.occluded;
-  if (suspects < kMinVisible || suspects < kMismatchShare * (s.visible() + s.occluded)) return false;
+  if (suspects < kMinVisible || suspects < kMismatchShare * (s.visible() + s.occluded))
+    return false;
   for (const auto& touch : s.touches) {
     const Observation& observation = observations.list[touch.observation];
     if (observation.class_id != candidate.object->class_id || touch.hit == 0) continue;
     covered = std::max(covered, touch.in_front);
-    fit = std::max(fit, model.explained_share(observation.points, static_cast<float>(1.5 * model.spacing_m()),
-                                              kShareBudget));
+    fit = std::max(
+        fit, model.explained_share(observation.points, static_cast<float>(1.5 * model.spacing_m()),
+                                   kShareBudget));
   }
-  if (s.visible() >= kMinVisible && s.seen_through_share() > kMismatchShare) return fit < kMismatchFit;
+  if (s.visible() >= kMinVisible && s.seen_through_share() > kMismatchShare)
+    return fit < kMismatchFit;
   const int seen = s.visible() + covered;
   return fit < kCoveredFit && seen >= kCoveredWhole * s.total &&
          s.seen_through + covered > kMismatchShare * seen;
@@ -93,14 +97,16 @@ std::optional<Match> match_of(const IcpResult& icp, const Points& source, const 
     distance += (here - icp.T_target_source * here).norm();
   }
   const Eigen::Vector3d center = centroid(source);
-  const Eigen::Vector3d moved_C = T_W_C.linear().transpose() * (center - icp.T_target_source * center);
+  const Eigen::Vector3d moved_C =
+      T_W_C.linear().transpose() * (center - icp.T_target_source * center);
   Match match;
   match.T_new_old = icp.T_target_source.inverse();
   match.displacement_m = distance / static_cast<double>(source.size());
   // Positive when the observation is nearer to the camera than the object was.
   match.sign = moved_C.z() < 0.0 ? 1 : -1;
-  match.cost = config.lambda_translation * match.displacement_m +
-               config.lambda_rotation * std::abs(Eigen::AngleAxisd(icp.T_target_source.linear()).angle());
+  match.cost =
+      config.lambda_translation * match.displacement_m +
+      config.lambda_rotation * std::abs(Eigen::AngleAxisd(icp.T_target_source.linear()).angle());
   match.stationary = false;
   return match;
 }
@@ -135,7 +141,8 @@ std::optional<Match> align_in_place(LibraryObject& object, const Observation& ob
   if (object.model.surfels().empty() || observation.points.empty()) return std::nullopt;
   const Points source = icp_source(observation, config);
   const auto target = target_of(object, config.icp_max_distance_m);
-  return match_of(point_to_plane_icp(*target, source, icp_options(object, config)), source, T_W_C, config);
+  return match_of(point_to_plane_icp(*target, source, icp_options(object, config)), source, T_W_C,
+                  config);
 }
 
 AssociationResult associate(const Candidate* candidates, std::size_t count,
@@ -167,11 +174,13 @@ AssociationResult associate(const Candidate* candidates, std::size_t count,
       match.observation = static_cast<std::int32_t>(j);
       const Sighting::Touch* touch = find_touch(sighting, match.observation);
       if (!doubtful) {
-        const double share = overlapping ? object.model.explained_share(
-                                               observation.points, static_cast<float>(1.5 * spacing), kShareBudget)
-                                         : 0.0;
+        const double share =
+            overlapping ? object.model.explained_share(
+                              observation.points, static_cast<float>(1.5 * spacing), kShareBudget)
+                        : 0.0;
         if (share > best_share[j]) best_share[j] = share, best_candidate[j] = c;
-        const bool holds_object = touch && touch->hit >= kMinVisible && touch->hit > kMajority * sighting.visible();
+        const bool holds_object =
+            touch && touch->hit >= kMinVisible && touch->hit > kMajority * sighting.visible();
         const bool explained = touch && touch->hit > 0 && share > kMajority;
         if (holds_object || explained) {
           match.cost = class_cost + 1.0 - share;

@@ -11,14 +11,15 @@ void DepthField::update(const OrganizedCloud& cloud) {
   constexpr float kNothing = std::numeric_limits<float>::infinity();
   cv::Mat depth(cloud.height, cloud.width, CV_32F);
   float* out = depth.ptr<float>();
-  for (std::size_t i = 0; i < cloud.size(); ++i) out[i] = cloud.depth_m[i] > 0.0f ? cloud.depth_m[i] : kNothing;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    out[i] = cloud.depth_m[i] > 0.0f ? cloud.depth_m[i] : kNothing;
   // Each radius erodes the one before it: the widest window costs as little as the difference.
   int done = 0;
   const cv::Mat* source = &depth;
   for (std::size_t k = 0; k < kRadii.size(); ++k) {
     const int side = 2 * (kRadii[k] - done) + 1;
-    cv::erode(*source, nearest_[k], cv::getStructuringElement(cv::MORPH_RECT, {side, side}), {-1, -1}, 1,
-              cv::BORDER_CONSTANT, cv::Scalar(kNothing));
+    cv::erode(*source, nearest_[k], cv::getStructuringElement(cv::MORPH_RECT, {side, side}),
+              {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(kNothing));
     done = kRadii[k];
     source = &nearest_[k];
   }
@@ -37,7 +38,9 @@ struct Projected {
   float depth_m;
 };
 
-bool is_measurement(PixelKind kind) { return kind != PixelKind::kDynamic && kind != PixelKind::kIgnore; }
+bool is_measurement(PixelKind kind) {
+  return kind != PixelKind::kDynamic && kind != PixelKind::kIgnore;
+}
 
 /// The measurement among the 3 x 3 pixels around that is nearest to the expected depth, or -1.
 std::int32_t best_pixel(const OrganizedCloud& cloud, const Projected& at) {
@@ -67,8 +70,9 @@ void touch(std::vector<Sighting::Touch>& touches, std::int32_t observation, bool
 
 }  // namespace
 
-void sight_object(const ObjectModel& model, ClassId class_id, int min_hits, const OrganizedCloud& cloud,
-                  const DepthField& field, const Observations& observations, const SightConfig& config,
+void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
+                  const OrganizedCloud& cloud, const DepthField& field,
+                  const Observations& observations, const SightConfig& config,
                   const DepthNoise& noise, Sighting& out) {
   out.total = out.hit = out.seen_through = out.occluded = out.unknown = out.hit_other_class = 0;
   out.differences_m.clear();
@@ -93,7 +97,8 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits, cons
     if (at.col < 0 || at.row < 0 || at.col >= cloud.width || at.row >= cloud.height) continue;
     const Eigen::Vector3f ray = eye_W - surfel.point_W;
     // Less than about six degrees between ray and surface measures nothing.
-    if (surfel.normal_W.dot(ray) < 0.1f * ray.norm() && surfel.normal_W.squaredNorm() > 0.5f) continue;
+    if (surfel.normal_W.dot(ray) < 0.1f * ray.norm() && surfel.normal_W.squaredNorm() > 0.5f)
+      continue;
 
     const std::int32_t pixel = best_pixel(cloud, at);
     if (pixel < 0) {
@@ -130,8 +135,11 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits, cons
         ++out.occluded;
         touch(out.touches, observations.observation_of[pixel], false);
         break;
-      case Sight::kUnknown: ++out.unknown; break;
-      case Sight::kOutOfView: break;
+      case Sight::kUnknown:
+        ++out.unknown;
+        break;
+      case Sight::kOutOfView:
+        break;
     }
   }
   std::sort(out.touches.begin(), out.touches.end(),

@@ -43,8 +43,8 @@ void validate_pose(const Pose& T, const std::string& source) {
   const Eigen::Matrix3d R = T.linear();
   const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (error > 1e-3 || R.determinant() < 0.0) {
-    throw InputError(source + ": pose rotation is not orthonormal (off by " + std::to_string(error) +
-                     ")");
+    throw InputError(source + ": pose rotation is not orthonormal (off by " +
+                     std::to_string(error) + ")");
   }
 }
 

@@ -4,10 +4,14 @@ namespace pocd {
 
 const char* to_string(EventKind kind) {
   switch (kind) {
-    case EventKind::kAdded: return "ADDED";
-    case EventKind::kUpdated: return "UPDATED";
-    case EventKind::kMoved: return "MOVED";
-    case EventKind::kRemoved: return "REMOVED";
+    case EventKind::kAdded:
+      return "ADDED";
+    case EventKind::kUpdated:
+      return "UPDATED";
+    case EventKind::kMoved:
+      return "MOVED";
+    case EventKind::kRemoved:
+      return "REMOVED";
   }
   return "";
 }

@@ -20,8 +20,8 @@ class ObjectTracker {
 
   const ObjectLibrary& library() const { return library_; }
 
-  /// Updates all beliefs from one frame, fuses, adds, moves and removes objects, clears the voxels of
-  /// removed ones, and says in `owner_of_observation` which object each observation belongs to
+  /// Updates all beliefs from one frame, fuses, adds, moves and removes objects, clears the voxels
+  /// of removed ones, and says in `owner_of_observation` which object each observation belongs to
   /// (IntegrationInput::kSkip for one that is not to be mapped yet).
   void update(const Frame& frame, const OrganizedCloud& cloud, const DepthField& field,
               const Observations& observations, const GroundModel& ground, TsdfMap& map,
@@ -39,9 +39,11 @@ class ObjectTracker {
   void remove_or_confirm(Step& step);
   void report_changes(Step& step);
 
-  /// An object that was moved or turned a little, too little to be seen through: true when it is found
-  /// displaced (and moved, once that has lasted), so that the observation must not be fused as it is.
-  bool shift_object(Step& step, LibraryObject& object, const Match& match, const Sighting& sighting);
+  /// An object that was moved or turned a little, too little to be seen through: true when it is
+  /// found displaced (and moved, once that has lasted), so that the observation must not be fused
+  /// as it is.
+  bool shift_object(Step& step, LibraryObject& object, const Match& match,
+                    const Sighting& sighting);
   void fuse(Step& step, LibraryObject& object, std::int32_t observation);
   void refit_box(Step& step, LibraryObject& object);
   /// Makes a new object the continuation of a known one: id, voxels, history.
@@ -55,15 +57,17 @@ class ObjectTracker {
   void mark_changed(LibraryObject& object);
   void confirm(Step& step, LibraryObject& object);
   void remove(Step& step, ObjectId id, const std::string& rule);
-  ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object, const std::string& rule);
+  ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
+                         const std::string& rule);
   double like_size_slack_m() const { return 3.0 * config_.map.voxel_size_m; }
 
   PipelineConfig config_;
   ObjectLibrary library_;
   RelocationMemory relocations_;
   std::uint64_t next_event_ = 1;
-  std::vector<Candidate> candidates_;  ///< a frame uses the first ones; memory is kept between frames
-  std::vector<ObjectId> changed_;      ///< since the last result
+  std::vector<Candidate>
+      candidates_;                 ///< a frame uses the first ones; memory is kept between frames
+  std::vector<ObjectId> changed_;  ///< since the last result
 };
 
 }  // namespace pocd

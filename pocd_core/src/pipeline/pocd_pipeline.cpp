@@ -29,7 +29,12 @@ class StageClock {
 
 struct PocdPipeline::Impl {
   explicit Impl(const PipelineConfig& c)
-      : config(c), classes(c.classes), pool(c.threads), pose_gate(c.pose_gate), tracker(c), map(c.map) {}
+      : config(c),
+        classes(c.classes),
+        pool(c.threads),
+        pose_gate(c.pose_gate),
+        tracker(c),
+        map(c.map) {}
 
   PipelineConfig config;
   ClassTable classes;
@@ -57,7 +62,8 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   Impl& p = *impl_;
   if (frame.depth_m.type() != CV_32FC1 || frame.depth_m.cols != frame.camera.width ||
       frame.depth_m.rows != frame.camera.height) {
-    throw InputError("frame " + std::to_string(frame.sequence) + ": depth is not the camera's size in metres");
+    throw InputError("frame " + std::to_string(frame.sequence) +
+                     ": depth is not the camera's size in metres");
   }
   FrameResult result;
   if (const auto reason = p.pose_gate.refuse(frame)) {
@@ -69,7 +75,8 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   const auto& segmentation = p.config.segmentation;
   const auto& noise = p.config.depth_noise;
 
-  organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes, p.pool, p.cloud);
+  organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes,
+           p.pool, p.cloud);
   clock.done("organize");
   Frame placed = frame;  // images are shared, not copied
   if (p.config.pose_refinement.enabled) {
@@ -83,10 +90,12 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   vote_planes(p.planes, segmentation.majority_share, p.cloud);
   p.ground.update(p.planes, segmentation, noise, p.cloud);
   clock.done("clean");
-  extract_observations(segmentation, noise, p.config.map.voxel_size_m, p.planes, p.cloud, p.observations);
+  extract_observations(segmentation, noise, p.config.map.voxel_size_m, p.planes, p.cloud,
+                       p.observations);
   clock.done("cluster");
   p.field.update(p.cloud);
-  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation, result);
+  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation,
+                   result);
   clock.done("objects");
   p.integrate(placed);
   clock.done("map");

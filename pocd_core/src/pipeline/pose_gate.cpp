@@ -5,11 +5,12 @@
 
 namespace pocd {
 
-bool PoseGate::plausible(const Pose& from, StampNs from_ns, const Pose& to, StampNs to_ns, double& jump_m,
-                         double& turn_deg) const {
+bool PoseGate::plausible(const Pose& from, StampNs from_ns, const Pose& to, StampNs to_ns,
+                         double& jump_m, double& turn_deg) const {
   const double seconds = std::abs(static_cast<double>(to_ns - from_ns)) * 1e-9;
   jump_m = (to.translation() - from.translation()).norm();
-  turn_deg = std::abs(Eigen::AngleAxisd(from.linear().transpose() * to.linear()).angle()) * 180.0 / M_PI;
+  turn_deg =
+      std::abs(Eigen::AngleAxisd(from.linear().transpose() * to.linear()).angle()) * 180.0 / M_PI;
   return jump_m <= config_.slack_m + config_.max_speed_mps * seconds &&
          turn_deg <= config_.slack_deg + config_.max_turn_dps * seconds;
 }
@@ -18,11 +19,13 @@ std::optional<std::string> PoseGate::refuse(const Frame& frame) {
   const auto [it, fresh] = tracks_.try_emplace(frame.robot);
   Track& track = it->second;
   double jump_m = 0.0, turn_deg = 0.0;
-  bool ok = fresh || plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns, jump_m, turn_deg);
+  bool ok = fresh || plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,
+                               jump_m, turn_deg);
   if (!ok) {
     double step_m = 0.0, step_deg = 0.0;
-    const bool agrees = track.refused_in_a_row > 0 && plausible(track.refused, track.refused_ns, frame.T_W_C,
-                                                                frame.stamp_ns, step_m, step_deg);
+    const bool agrees =
+        track.refused_in_a_row > 0 &&
+        plausible(track.refused, track.refused_ns, frame.T_W_C, frame.stamp_ns, step_m, step_deg);
     track.refused_in_a_row = agrees ? track.refused_in_a_row + 1 : 1;
     track.refused = frame.T_W_C;
     track.refused_ns = frame.stamp_ns;

@@ -52,7 +52,8 @@ class Aligner {
       const int row = static_cast<int>(std::lround(fy * p_C.y() / p_C.z() + cy));
       if (col < 0 || row < 0 || col >= cloud_.width || row >= cloud_.height) continue;
       const std::size_t i = static_cast<std::size_t>(row) * cloud_.width + col;
-      if (cloud_.kind[i] != PixelKind::kObject && cloud_.kind[i] != PixelKind::kBackground) continue;
+      if (cloud_.kind[i] != PixelKind::kObject && cloud_.kind[i] != PixelKind::kBackground)
+        continue;
       // Rays that graze the surface measure the silhouette, not the surface.
       const Eigen::Vector3f ray = s.point_W - eye_W.cast<float>();
       if (-s.normal_W.dot(ray) < 0.2f * ray.norm()) continue;
@@ -70,7 +71,8 @@ class Aligner {
       Vector4d J;
       J << n, n.y() * arm.x() - n.x() * arm.y();
       sum.H += w * J * J.transpose();
-      sum.b += w * J * (r - J.dot(x));  // linearised about zero, so that the prior stays at the given pose
+      sum.b += w * J *
+               (r - J.dot(x));  // linearised about zero, so that the prior stays at the given pose
     }
   }
 
@@ -90,7 +92,8 @@ std::optional<Pose> refine_pose(const OrganizedCloud& cloud, const ObjectLibrary
   const double half_width = cloud.width / cloud.camera.fx / 2.0;
   const auto ids = library.near(center_W, max_depth_m * std::hypot(0.5, half_width));
   const double heading_rad = config.sigma_heading_deg * M_PI / 180.0;
-  const Vector4d sigma(config.sigma_position_m, config.sigma_position_m, config.sigma_position_m / 3.0, heading_rad);
+  const Vector4d sigma(config.sigma_position_m, config.sigma_position_m,
+                       config.sigma_position_m / 3.0, heading_rad);
   const Matrix4d prior = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 
   const Aligner aligner(cloud, max_depth_m, noise);
@@ -101,7 +104,8 @@ std::optional<Pose> refine_pose(const OrganizedCloud& cloud, const ObjectLibrary
     const Pose T = motion(x, eye_W);
     for (const ObjectId id : ids) {
       const LibraryObject& object = *library.find(id);
-      if (object.confirmed && object.belief.stationarity() > kTrusted) aligner.add(object, T, x, sum);
+      if (object.confirmed && object.belief.stationarity() > kTrusted)
+        aligner.add(object, T, x, sum);
     }
     if (sum.pairs < config.min_points) return std::nullopt;
     x = -(sum.H + prior).ldlt().solve(sum.b);

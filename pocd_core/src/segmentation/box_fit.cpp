@@ -55,8 +55,8 @@ std::vector<cv::Point2f> footprint(const OrientedBox& box, double min_size_m) {
 
 namespace {
 
-/// Heading in (-45, 45] degrees, modulo a quarter turn, to which upright normals agree; nothing when
-/// there are few or they do not agree (round or cluttered things).
+/// Heading in (-45, 45] degrees, modulo a quarter turn, to which upright normals agree; nothing
+/// when there are few or they do not agree (round or cluttered things).
 std::optional<double> heading_of_normals(const Points& normals_W) {
   constexpr float kUpright = 0.5f;    // sine of the largest tilt of a side face
   constexpr double kAgreement = 0.7;  // mean resultant length of four times the angle
@@ -119,13 +119,16 @@ OrientedBox fit_box_pca(const Points& points_W) {
 double box_overlap(const OrientedBox& a, const OrientedBox& b, double min_size_m) {
   const auto size = [&](const OrientedBox& box) { return box.size_m.cwiseMax(min_size_m).eval(); };
   const Eigen::Vector3d sa = size(a), sb = size(b);
-  const double low = std::max(a.pose.position_W.z() - sa.z() / 2, b.pose.position_W.z() - sb.z() / 2);
-  const double high = std::min(a.pose.position_W.z() + sa.z() / 2, b.pose.position_W.z() + sb.z() / 2);
+  const double low =
+      std::max(a.pose.position_W.z() - sa.z() / 2, b.pose.position_W.z() - sb.z() / 2);
+  const double high =
+      std::min(a.pose.position_W.z() + sa.z() / 2, b.pose.position_W.z() + sb.z() / 2);
   if (high <= low) return 0.0;
   const double reach = 0.5 * (sa.head<2>().norm() + sb.head<2>().norm());
   if ((a.pose.position_W - b.pose.position_W).head<2>().norm() >= reach) return 0.0;
   std::vector<cv::Point2f> common;
-  const float area = cv::intersectConvexConvex(footprint(a, min_size_m), footprint(b, min_size_m), common);
+  const float area =
+      cv::intersectConvexConvex(footprint(a, min_size_m), footprint(b, min_size_m), common);
   return static_cast<double>(area) * (high - low) / std::min(sa.prod(), sb.prod());
 }
 

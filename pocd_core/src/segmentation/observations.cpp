@@ -8,8 +8,8 @@
 namespace pocd {
 namespace {
 
-/// Union-find over pixels with path halving; the root is the smallest index, so labels do not depend
-/// on the order of joins.
+/// Union-find over pixels with path halving; the root is the smallest index, so labels do not
+/// depend on the order of joins.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t size) : parent_(size) {
@@ -38,13 +38,15 @@ struct Cluster {
   OrientedBox box;
 };
 
-/// Whether object pixel b belongs with object pixel a, whose largest distance to neighbours is given.
+/// Whether object pixel b belongs with object pixel a, whose largest distance to neighbours is
+/// given.
 bool connected(const OrganizedCloud& cloud, std::int32_t a, std::int32_t b, float limit_m) {
   if (cloud.kind[b] != PixelKind::kObject || cloud.label[a] != cloud.label[b] ||
       cloud.instance[a] != cloud.instance[b]) {
     return false;
   }
-  const float dx = cloud.x_W[a] - cloud.x_W[b], dy = cloud.y_W[a] - cloud.y_W[b], dz = cloud.z_W[a] - cloud.z_W[b];
+  const float dx = cloud.x_W[a] - cloud.x_W[b], dy = cloud.y_W[a] - cloud.y_W[b],
+              dz = cloud.z_W[a] - cloud.z_W[b];
   return dx * dx + dy * dy + dz * dz < limit_m * limit_m;
 }
 
@@ -60,7 +62,8 @@ std::vector<Cluster> find_clusters(const OrganizedCloud& cloud, const Segmentati
       const std::int32_t i = row * width + col;
       if (cloud.kind[i] != PixelKind::kObject) continue;
       const float z = cloud.depth_m[i];
-      const float limit = tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
+      const float limit =
+          tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
       const auto try_join = [&](std::int32_t j) {
         const bool joined = connected(cloud, i, j, limit);
         if (joined) sets.join(i, j);
@@ -113,8 +116,10 @@ OrientedBox sample_box(const OrganizedCloud& cloud, const PlaneSegmentation& pla
   return fit_box(points, normals, 0.01);
 }
 
-/// The published rule: overlapping cuboids are one thing seen in pieces. The larger one's class wins.
-void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& planes, double min_size_m, std::vector<Cluster>& clusters) {
+/// The published rule: overlapping cuboids are one thing seen in pieces. The larger one's class
+/// wins.
+void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& planes,
+                       double min_size_m, std::vector<Cluster>& clusters) {
   constexpr double kSameClass = 0.3, kOtherClass = 0.8;
   for (Cluster& c : clusters) c.box = sample_box(cloud, planes, c.members);
   bool merged = true;
@@ -127,7 +132,8 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
         if (large.instance != small.instance) continue;
         const bool same = large.class_id == small.class_id;
         if (!same && small.pixels * 4 > large.pixels) continue;
-        if (box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass)) continue;
+        if (box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass))
+          continue;
         large.members.insert(large.members.end(), small.members.begin(), small.members.end());
         large.pixels += small.pixels;
         large.area_m2 += small.area_m2;
@@ -159,7 +165,9 @@ std::vector<SurfacePoint> thin(const OrganizedCloud& cloud, const PlaneSegmentat
     if (step > 1 && ((i % cloud.width) % step != 0 || (i / cloud.width) % step != 0)) continue;
     const Eigen::Vector3f p = cloud.point_W(i);
     const auto cell = [&](float v) {
-      return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v * inverse)) + (1 << 20)) & 0x1FFFFF;
+      return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v * inverse)) +
+                                        (1 << 20)) &
+             0x1FFFFF;
     };
     const std::uint64_t key = cell(p.x()) | cell(p.y()) << 21 | cell(p.z()) << 42;
     const auto [it, fresh] = slot_of.try_emplace(key, sums.size());
@@ -186,8 +194,8 @@ std::vector<SurfacePoint> thin(const OrganizedCloud& cloud, const PlaneSegmentat
 }
 
 /// Hands pixels of the ground band that carry the class of the observation above them to it.
-void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config, const DepthNoise& noise,
-                Observations& out) {
+void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config,
+                const DepthNoise& noise, Observations& out) {
   const float tolerance = static_cast<float>(config.cluster_tolerance_m);
   const float pixel_angle = static_cast<float>(1.0 / cloud.camera.fy);
   for (int row = 1; row < cloud.height; ++row) {
@@ -201,7 +209,8 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config, c
       }
       // The class says whose it is; depth must go on from the row above.
       const float z = cloud.depth_m[i];
-      const float limit = 0.5f * tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
+      const float limit =
+          0.5f * tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
       if (std::abs(z - cloud.depth_m[above]) < limit) out.observation_of[i] = owner;
     }
   }
@@ -209,8 +218,9 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config, c
 
 }  // namespace
 
-void extract_observations(const SegmentationConfig& config, const DepthNoise& noise, double spacing_m,
-                          const PlaneSegmentation& planes, OrganizedCloud& cloud, Observations& out) {
+void extract_observations(const SegmentationConfig& config, const DepthNoise& noise,
+                          double spacing_m, const PlaneSegmentation& planes, OrganizedCloud& cloud,
+                          Observations& out) {
   std::vector<Cluster> clusters = find_clusters(cloud, config, noise);
   merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters);
   out.list.clear();

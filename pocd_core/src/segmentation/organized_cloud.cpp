@@ -5,11 +5,16 @@ namespace {
 
 PixelKind kind_of(ClassRole role) {
   switch (role) {
-    case ClassRole::kGround: return PixelKind::kGround;
-    case ClassRole::kObject: return PixelKind::kObject;
-    case ClassRole::kDynamic: return PixelKind::kDynamic;
-    case ClassRole::kIgnore: return PixelKind::kIgnore;
-    case ClassRole::kBackground: break;
+    case ClassRole::kGround:
+      return PixelKind::kGround;
+    case ClassRole::kObject:
+      return PixelKind::kObject;
+    case ClassRole::kDynamic:
+      return PixelKind::kDynamic;
+    case ClassRole::kIgnore:
+      return PixelKind::kIgnore;
+    case ClassRole::kBackground:
+      break;
   }
   return PixelKind::kBackground;
 }

@@ -61,7 +61,8 @@ bool finish(Cell& cell, double tolerance_m, const DepthNoise& noise) {
   if (!(norm > 1e-9)) return false;
   cell.normal_C = (-abc / norm).cast<float>();
   cell.offset_m = static_cast<float>(-1.0 / norm);
-  cell.centroid_C = Eigen::Vector3d(cell.fit.x / cell.fit.n * z, cell.fit.y / cell.fit.n * z, z).cast<float>();
+  cell.centroid_C =
+      Eigen::Vector3d(cell.fit.x / cell.fit.n * z, cell.fit.y / cell.fit.n * z, z).cast<float>();
   cell.tolerance_m = static_cast<float>(tolerance_m + 3.0 * sigma);
   return true;
 }
@@ -78,7 +79,8 @@ void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& confi
   constexpr int kSide = PlaneSegmentation::kCellSide;
   const int cols = (cloud.width + kSide - 1) / kSide, rows = (cloud.height + kSide - 1) / kSide;
   std::vector<Cell> cells(static_cast<std::size_t>(cols) * rows);
-  const double fx = cloud.camera.fx, fy = cloud.camera.fy, cx = cloud.camera.cx, cy = cloud.camera.cy;
+  const double fx = cloud.camera.fx, fy = cloud.camera.fy, cx = cloud.camera.cx,
+               cy = cloud.camera.cy;
   for (int row = 0; row < cloud.height; ++row) {
     const double y = (row - cy) / fy;
     for (int col = 0; col < cloud.width; ++col) {
@@ -118,7 +120,8 @@ void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& confi
   }
   std::vector<Cell> plane_cells;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    // A far, wide plane may bend by lens error; accept it all the same, with the cells' own tolerance.
+    // A far, wide plane may bend by lens error; accept it all the same, with the cells' own
+    // tolerance.
     if (!cells[i].planar || find_root(parent, static_cast<int>(i)) != static_cast<int>(i)) continue;
     Cell& sum = sums[i];
     sum.planar = finish(sum, config.plane_tolerance_m, noise);
@@ -128,8 +131,7 @@ void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& confi
     const Eigen::Vector3f normal_W = cloud.T_W_C.linear().cast<float>() * sum.normal_C;
     const Eigen::Vector3f centroid_W = (cloud.T_W_C * sum.centroid_C.cast<double>()).cast<float>();
     // The centroid of inverse depths lies off the plane; the offset comes from the fit.
-    const float offset_m =
-        sum.offset_m + normal_W.dot(cloud.T_W_C.translation().cast<float>());
+    const float offset_m = sum.offset_m + normal_W.dot(cloud.T_W_C.translation().cast<float>());
     out.planes.push_back({normal_W, offset_m, centroid_W, 0});
   }
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -142,10 +144,9 @@ void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& confi
       const std::size_t i = static_cast<std::size_t>(row) * cloud.width + col;
       if (cloud.kind[i] == PixelKind::kNone) continue;
       const int r = row / kSide, c = col / kSide;
-      const std::array<int, 5> near{r * cols + c, r > 0 ? (r - 1) * cols + c : -1,
-                                    r + 1 < rows ? (r + 1) * cols + c : -1,
-                                    c > 0 ? r * cols + c - 1 : -1,
-                                    c + 1 < cols ? r * cols + c + 1 : -1};
+      const std::array<int, 5> near{
+          r * cols + c, r > 0 ? (r - 1) * cols + c : -1, r + 1 < rows ? (r + 1) * cols + c : -1,
+          c > 0 ? r * cols + c - 1 : -1, c + 1 < cols ? r * cols + c + 1 : -1};
       const Eigen::Vector3f p_W = cloud.point_W(i);
       const float tolerance =
           static_cast<float>(config.plane_tolerance_m + 3.0 * noise.sigma(cloud.depth_m[i]));
@@ -181,7 +182,8 @@ struct PlaneVotes {
   const ClassCount* winner(std::size_t plane) const {
     const ClassCount* best = nullptr;
     for (const ClassCount& c : counts[plane]) {
-      if (!best || c.count > best->count || (c.count == best->count && c.label < best->label)) best = &c;
+      if (!best || c.count > best->count || (c.count == best->count && c.label < best->label))
+        best = &c;
     }
     return best;
   }
@@ -233,26 +235,31 @@ void GroundModel::update(const PlaneSegmentation& planes, const SegmentationConf
                          const DepthNoise& noise, OrganizedCloud& cloud) {
   const PlaneVotes tally = count_votes(planes, cloud);
   const float min_up = static_cast<float>(std::cos(config.ground_max_tilt_deg * M_PI / 180.0));
-  const int min_pixels = static_cast<int>(config.ground_min_share * static_cast<double>(cloud.size()));
+  const int min_pixels =
+      static_cast<int>(config.ground_min_share * static_cast<double>(cloud.size()));
   const float camera_z = static_cast<float>(cloud.T_W_C.translation().z());
   const Plane* best = nullptr;
   bool best_class = false;
   for (std::size_t p = 0; p < planes.planes.size(); ++p) {
     const Plane& plane = planes.planes[p];
-    if (plane.normal_W.z() < min_up || plane.pixels < min_pixels || plane.centroid_W.z() >= camera_z) continue;
+    if (plane.normal_W.z() < min_up || plane.pixels < min_pixels ||
+        plane.centroid_W.z() >= camera_z)
+      continue;
     const ClassCount* winner = tally.winner(p);
     const bool is_class = winner && winner->kind == PixelKind::kGround;
     const bool better = !best || (is_class && !best_class) ||
                         (is_class == best_class && plane.centroid_W.z() < best->centroid_W.z());
     if (better) best = &plane, best_class = is_class;
   }
-  // A plane that was found by its looks alone replaces a known ground only when it lies at or below it:
-  // a table top is not the floor because the floor is out of view.
+  // A plane that was found by its looks alone replaces a known ground only when it lies at or below
+  // it: a table top is not the floor because the floor is out of view.
   const float x = best ? best->centroid_W.x() : 0.0f, y = best ? best->centroid_W.y() : 0.0f;
-  const bool take = best && (!known_ || (best_class && !from_class_) ||
-                             (best_class == from_class_ &&
-                              (best_class || best->centroid_W.z() <
-                                                 height_at(x, y) + 2.0f * static_cast<float>(config.ground_band_m))));
+  const bool take =
+      best &&
+      (!known_ || (best_class && !from_class_) ||
+       (best_class == from_class_ &&
+        (best_class || best->centroid_W.z() <
+                           height_at(x, y) + 2.0f * static_cast<float>(config.ground_band_m))));
   if (take) {
     known_ = true;
     from_class_ = best_class;

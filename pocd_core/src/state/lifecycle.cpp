@@ -46,7 +46,8 @@ Evidence apply_measurement(LibraryObject& object, double delta_m, const Sighting
   const UpdateResult update = bayesian_update(object.belief, measurement, change.delta_max_m);
   evidence.c1 = update.c1;
   evidence.c2 = update.c2;
-  object.belief = next_belief(object.belief, evidence.delta_m, object.stationarity_class, evidence.k, state, change);
+  object.belief = next_belief(object.belief, evidence.delta_m, object.stationarity_class,
+                              evidence.k, state, change);
   evidence.after = object.belief;
   return evidence;
 }
@@ -55,8 +56,8 @@ std::optional<std::string> removal_rule(const LibraryObject& object, const State
                                         const ChangeConfig& change) {
   if (object.belief.stationarity() < state.remove_below) return "stationarity_below_threshold";
   // Beyond the distance that verifies an object, by more than the belief's drift under noise.
-  if (object.confirmed && std::abs(object.belief.mu) > 0.6 * change.tau_m && object.observations > 0 &&
-      object.belief.sigma < std::abs(object.belief.mu)) {
+  if (object.confirmed && std::abs(object.belief.mu) > 0.6 * change.tau_m &&
+      object.observations > 0 && object.belief.sigma < std::abs(object.belief.mu)) {
     return "change_established";
   }
   if (static_cast<double>(object.model.surfels().size()) <
@@ -87,10 +88,11 @@ bool fits_inside(const OrientedBox& part, const OrientedBox& whole, double slack
 }
 
 const RelocationMemory::Removed* RelocationMemory::find(ClassId class_id, const OrientedBox& box,
-                                                        StampNs now_ns, double window_s, double reach_m,
-                                                        double slack_m) {
+                                                        StampNs now_ns, double window_s,
+                                                        double reach_m, double slack_m) {
   const auto window_ns = static_cast<StampNs>(window_s * 1e9);
-  while (!removed_.empty() && now_ns - removed_.front().removed_ns > window_ns) removed_.pop_front();
+  while (!removed_.empty() && now_ns - removed_.front().removed_ns > window_ns)
+    removed_.pop_front();
   const Removed* best = nullptr;
   double best_distance = 0.0;
   for (const Removed& removed : removed_) {
@@ -106,7 +108,8 @@ const RelocationMemory::Removed* RelocationMemory::find(ClassId class_id, const 
 }
 
 void RelocationMemory::forget(ObjectId id) {
-  removed_.erase(std::remove_if(removed_.begin(), removed_.end(), [&](const Removed& r) { return r.id == id; }),
+  removed_.erase(std::remove_if(removed_.begin(), removed_.end(),
+                                [&](const Removed& r) { return r.id == id; }),
                  removed_.end());
 }
 

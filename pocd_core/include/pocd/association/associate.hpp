@@ -19,9 +19,11 @@ struct Candidate {
 struct Match {
   std::size_t candidate = 0;
   std::int32_t observation = 0;
-  /// Motion of the object that explains the observation [m, rad]; identity when it lies where it was.
+  /// Motion of the object that explains the observation [m, rad]; identity when it lies where it
+  /// was.
   Pose T_new_old = Pose::Identity();
-  /// Mean displacement of the observation's points under that motion [m]; 0 when it lies where it was.
+  /// Mean displacement of the observation's points under that motion [m]; 0 when it lies where it
+  /// was.
   double displacement_m = 0.0;
   /// Positive when the observation is in front of the object seen from the camera, as published.
   int sign = 1;
@@ -43,16 +45,18 @@ struct AssociationResult {
   std::vector<bool> doubtful;
 };
 
-/// How an object that is still about where it was may have moved: point-to-plane ICP from its place,
-/// which moves it along no direction that its surface leaves open. Nothing when it does not fit.
+/// How an object that is still about where it was may have moved: point-to-plane ICP from its
+/// place, which moves it along no direction that its surface leaves open. Nothing when it does not
+/// fit.
 std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
                                     const Pose& T_W_C, const AssociationConfig& config);
 
-/// Pairs within the gates (class, centroid distance or overlapping boxes). An object that most of its
-/// visible points say is in place matches the observation that they hit, without ICP; one that is in
-/// doubt is aligned by point-to-plane ICP and costs lambda_translation |t| + lambda_rotation |angle|
-/// + lambda_class [classes differ]. Costs above the cutoff and dissimilarities above the limit are no
-/// pair. The assignment is optimal over the gated pairs.
+/// Pairs within the gates (class, centroid distance or overlapping boxes). An object that most of
+/// its visible points say is in place matches the observation that they hit, without ICP; one that
+/// is in doubt is aligned by point-to-plane ICP and costs lambda_translation |t| + lambda_rotation
+/// |angle|
+/// + lambda_class [classes differ]. Costs above the cutoff and dissimilarities above the limit are
+/// no pair. The assignment is optimal over the gated pairs.
 AssociationResult associate(const Candidate* candidates, std::size_t count,
                             const Observations& observations, const Pose& T_W_C,
                             const AssociationConfig& config);

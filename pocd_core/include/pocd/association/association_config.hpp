@@ -19,17 +19,22 @@ struct AssociationConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("max_distance_m", max_distance_m, Range{0.01, 100.0},
-          "Objects and observations whose boxes' centres are farther apart are no pair, unless their "
-          "boxes overlap, theta_dist [m].");
+    visit(
+        "max_distance_m", max_distance_m, Range{0.01, 100.0},
+        "Objects and observations whose boxes' centres are farther apart are no pair, unless their "
+        "boxes overlap, theta_dist [m].");
     visit("max_dissimilarity", max_dissimilarity, Range{0.0, 1.0},
           "Largest share of outliers after ICP, theta_sim.");
-    visit("cutoff_cost", cutoff_cost, Range{0.0, 1e6}, "Pairs that cost more are no pair, theta_cutoff.");
-    visit("lambda_translation", lambda_translation, Range{0.0, 1e6}, "Cost per metre of translation [1/m].");
-    visit("lambda_rotation", lambda_rotation, Range{0.0, 1e6}, "Cost per radian of rotation [1/rad].");
+    visit("cutoff_cost", cutoff_cost, Range{0.0, 1e6},
+          "Pairs that cost more are no pair, theta_cutoff.");
+    visit("lambda_translation", lambda_translation, Range{0.0, 1e6},
+          "Cost per metre of translation [1/m].");
+    visit("lambda_rotation", lambda_rotation, Range{0.0, 1e6},
+          "Cost per radian of rotation [1/rad].");
     visit("lambda_class", lambda_class, Range{0.0, 1e9}, "Cost of two different classes.");
     visit("min_visible_share", min_visible_share, Range{0.0, 1.0},
-          "Share of an object's points that a frame must see, or see through, before the absence of an "
+          "Share of an object's points that a frame must see, or see through, before the absence "
+          "of an "
           "observation says anything, theta_vis.");
     visit("icp_points", icp_points, Range{20, 100000}, "Points of an observation used by ICP.");
     visit("icp_iterations", icp_iterations, Range{1, 200}, "Iterations of ICP.");

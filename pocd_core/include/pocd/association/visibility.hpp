@@ -12,8 +12,9 @@
 
 namespace pocd {
 
-/// Being in the frustum is not being visible. kSeenThrough: the camera measured something farther by
-/// more than the margin, all around the point. kHit: it measured the point. kOccluded: something nearer.
+/// Being in the frustum is not being visible. kSeenThrough: the camera measured something farther
+/// by more than the margin, all around the point. kHit: it measured the point. kOccluded: something
+/// nearer.
 enum class Sight : std::uint8_t { kOutOfView, kUnknown, kOccluded, kHit, kSeenThrough };
 
 /// Depth of the grid with nearest-surface filters of growing radius, made once per frame.
@@ -32,8 +33,8 @@ class DepthField {
 };
 
 struct SightConfig {
-  double margin_m = 0.1;          ///< depth difference that still is the same surface
-  double pose_tolerance_m = 0.03; ///< sideways
+  double margin_m = 0.1;           ///< depth difference that still is the same surface
+  double pose_tolerance_m = 0.03;  ///< sideways
   double max_depth_m = 3.0;
 };
 
@@ -65,10 +66,11 @@ struct Sighting {
   }
 };
 
-/// Projects the model into the frame. Surfels facing away are out of view. Margin: config.margin_m or
-/// three sigma of the depth noise, whichever is larger.
-void sight_object(const ObjectModel& model, ClassId class_id, int min_hits, const OrganizedCloud& cloud,
-                  const DepthField& field, const Observations& observations, const SightConfig& config,
+/// Projects the model into the frame. Surfels facing away are out of view. Margin: config.margin_m
+/// or three sigma of the depth noise, whichever is larger.
+void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
+                  const OrganizedCloud& cloud, const DepthField& field,
+                  const Observations& observations, const SightConfig& config,
                   const DepthNoise& noise, Sighting& out);
 
 }  // namespace pocd

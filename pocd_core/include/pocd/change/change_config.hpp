@@ -22,11 +22,14 @@ struct ChangeConfig {
           "ray_traced: mean difference of two TSDFs, as published.");
     visit("lambda_diff", lambda_diff, Range{0.0, 100.0}, "Scale of the ray-traced measure.");
     visit("delta_max_m", delta_max_m, Range{0.01, 100.0},
-          "Largest change, and the pseudo-change of an object that is not there any more, Delta_max [m].");
-    visit("tau_m", tau_m, Range{0.001, 10.0},
-          "Standard deviation of a measured change; changes up to half of it verify an object [m].");
+          "Largest change, and the pseudo-change of an object that is not there any more, "
+          "Delta_max [m].");
+    visit(
+        "tau_m", tau_m, Range{0.001, 10.0},
+        "Standard deviation of a measured change; changes up to half of it verify an object [m].");
     visit("pose_tolerance_m", pose_tolerance_m, Range{0.0, 1.0},
-          "Sideways error of poses: rays that pass nearer to a closer surface see through nothing [m].");
+          "Sideways error of poses: rays that pass nearer to a closer surface see through nothing "
+          "[m].");
     visit("tsdf_truncation_m", tsdf_truncation_m, Range{0.01, 10.0},
           "Truncation of the two TSDFs of the ray-traced measure [m].");
   }

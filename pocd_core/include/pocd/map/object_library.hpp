@@ -29,17 +29,17 @@ struct LibraryObject {
   StampNs last_seen_ns = 0;
   std::string last_robot;
   std::uint32_t observations = 0;
-  int frames_in_view = 0;        ///< tentative only
-  int frames_seen_through = 0;   ///< in a row
-  int frames_displaced = 0;      ///< in a row
-  OrientedBox reported_box;      ///< as in the last event
-  bool growing = false;          ///< the last observation added a notable share of its points
-  std::size_t gained = 0;        ///< points since the last event
-  std::size_t lost = 0;          ///< points since the last event
+  int frames_in_view = 0;           ///< tentative only
+  int frames_seen_through = 0;      ///< in a row
+  int frames_displaced = 0;         ///< in a row
+  OrientedBox reported_box;         ///< as in the last event
+  bool growing = false;             ///< the last observation added a notable share of its points
+  std::size_t gained = 0;           ///< points since the last event
+  std::size_t lost = 0;             ///< points since the last event
   std::optional<StampNs> added_ns;  ///< when reported as new; unset for what was known before
   ObjectId moved_from = ObjectId::kNone;  ///< tentative: the object that it may be, elsewhere
-  bool changed = false;          ///< since the last FrameResult
-  std::size_t box_surfels = 0;   ///< size of the model when the box was fitted
+  bool changed = false;                   ///< since the last FrameResult
+  std::size_t box_surfels = 0;            ///< size of the model when the box was fitted
   std::size_t most_surfels = 0;
   /// Objects that share an observation with this one, and for how many frames.
   std::map<ObjectId, int> companions;
@@ -47,8 +47,8 @@ struct LibraryObject {
   std::shared_ptr<const IcpTarget> icp_target;
 };
 
-/// Objects by id, with a grid over the ground plane to find those near a place: a frame's cost depends
-/// on what is in view. Not thread-safe.
+/// Objects by id, with a grid over the ground plane to find those near a place: a frame's cost
+/// depends on what is in view. Not thread-safe.
 class ObjectLibrary {
  public:
   LibraryObject& create(double spacing_m);

@@ -11,9 +11,9 @@ namespace pocd {
 
 struct Surfel {
   Eigen::Vector3f point_W;
-  Eigen::Vector3f normal_W;  ///< unit, or zero where unknown
-  float weight = 0.0f;       ///< sum of inverse variances [1/m2], capped
-  std::uint16_t hits = 0;    ///< frames that measured it
+  Eigen::Vector3f normal_W;       ///< unit, or zero where unknown
+  float weight = 0.0f;            ///< sum of inverse variances [1/m2], capped
+  std::uint16_t hits = 0;         ///< frames that measured it
   std::uint8_t seen_through = 0;  ///< frames in a row that saw through it
 };
 
@@ -33,8 +33,8 @@ class ObjectModel {
   /// Share of the points with a surfel within `radius_m`; looks at no more than `budget` of them.
   double explained_share(const std::vector<SurfacePoint>& points, float radius_m, int budget) const;
 
-  /// Fuses measured points: a surfel near one moves along its normal by inverse variance; else a new
-  /// one is made. Returns how many are new.
+  /// Fuses measured points: a surfel near one moves along its normal by inverse variance; else a
+  /// new one is made. Returns how many are new.
   int fuse(const std::vector<SurfacePoint>& points);
 
   /// Adds the surfels of another model where this one has none.

@@ -14,11 +14,11 @@ namespace pocd {
 struct ObjectSnapshot {
   ObjectId id = ObjectId::kNone;
   ClassId class_id = 0;
-  int stationarity_class = 0;  ///< s: 0 movable, 1 static
-  OrientedBox box;             ///< map frame
+  int stationarity_class = 0;                            ///< s: 0 movable, 1 static
+  OrientedBox box;                                       ///< map frame
   Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();  ///< mean of the mapped surface points [m]
-  /// The 4-DoF pose: x, y and heading of the box, and the mean height of the surface, which does not
-  /// depend on how much of the foot is hidden.
+  /// The 4-DoF pose: x, y and heading of the box, and the mean height of the surface, which does
+  /// not depend on how much of the foot is hidden.
   Pose4 pose() const {
     return {{box.pose.position_W.x(), box.pose.position_W.y(), centroid_W.z()}, box.pose.yaw_rad};
   }
@@ -34,12 +34,12 @@ const char* to_string(EventKind kind);  ///< "ADDED", "UPDATED", "MOVED", "REMOV
 
 /// Why an event happened: enough to recompute the belief step that made it.
 struct Evidence {
-  double delta_m = 0.0;        ///< measured geometric change
-  int stationarity_class = 0;  ///< s of the measurement
-  double k = 0.0;              ///< weight of the semantic likelihood
-  double c1 = 0.0;             ///< inlier probability of the measurement
-  double c2 = 0.0;             ///< outlier probability, c1 + c2 = 1
-  double visible_share = 0.0;  ///< of the object's points that this frame had evidence about
+  double delta_m = 0.0;             ///< measured geometric change
+  int stationarity_class = 0;       ///< s of the measurement
+  double k = 0.0;                   ///< weight of the semantic likelihood
+  double c1 = 0.0;                  ///< inlier probability of the measurement
+  double c2 = 0.0;                  ///< outlier probability, c1 + c2 = 1
+  double visible_share = 0.0;       ///< of the object's points that this frame had evidence about
   double seen_through_share = 0.0;  ///< of those, the share the camera saw through
   double measurement_sigma_m = 0.0;
   Belief before, after;
@@ -51,10 +51,10 @@ struct ObjectEvent {
   EventKind kind = EventKind::kAdded;
   ObjectId object = ObjectId::kNone;
   ClassId class_id = 0;
-  StampNs stamp_ns = 0;            ///< of the frame that caused it
+  StampNs stamp_ns = 0;  ///< of the frame that caused it
   std::uint64_t frame_sequence = 0;
   std::string robot;
-  OrientedBox box;                  ///< now (for REMOVED: the last one)
+  OrientedBox box;                          ///< now (for REMOVED: the last one)
   std::optional<OrientedBox> previous_box;  ///< MOVED: where it was
   Evidence evidence;
 };
@@ -66,12 +66,12 @@ struct StageTiming {
 };
 
 struct FrameResult {
-  bool accepted = true;             ///< false: the frame was refused as a whole, see warnings
+  bool accepted = true;  ///< false: the frame was refused as a whole, see warnings
   std::vector<ObjectEvent> events;
   /// Confirmed library entries that are new or changed, by id.
   std::vector<ObjectSnapshot> changed_objects;
-  /// Ids that left the library: removed (with an event), moved under their old id, or found to be a part
-  /// of another object (its event is UPDATED). Ascending.
+  /// Ids that left the library: removed (with an event), moved under their old id, or found to be a
+  /// part of another object (its event is UPDATED). Ascending.
   std::vector<ObjectId> retired;
   std::vector<StageTiming> timings;
   /// One line each, e.g. "pose jump of 0.31 m: frame not used for object states".

@@ -32,7 +32,8 @@ struct PipelineConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("threads", threads, Range{1, 64}, "Threads of the pipeline; results do not depend on it.");
+    visit("threads", threads, Range{1, 64},
+          "Threads of the pipeline; results do not depend on it.");
     visit.group("depth_noise", depth_noise, "Noise of the depth camera.");
     visit.group("pose_gate", pose_gate, "Refusing frames with impossible poses.");
     visit.group("pose_refinement", pose_refinement, "Correcting poses by what stands still.");

@@ -11,15 +11,16 @@
 
 namespace pocd {
 
-/// Owns the object library and the map. Not thread-safe; it uses `config.threads` threads inside and
-/// gives the same bits for every number of them.
+/// Owns the object library and the map. Not thread-safe; it uses `config.threads` threads inside
+/// and gives the same bits for every number of them.
 class PocdPipeline {
  public:
   explicit PocdPipeline(const PipelineConfig& config);
   ~PocdPipeline();
 
-  /// Frames of one or several robots, in the order they are to be fused. Throws InputError for a frame
-  /// that make_frame would not have made; anything merely implausible is a warning in the result.
+  /// Frames of one or several robots, in the order they are to be fused. Throws InputError for a
+  /// frame that make_frame would not have made; anything merely implausible is a warning in the
+  /// result.
   FrameResult process_frame(const Frame& frame);
 
   /// Confirmed objects by id.

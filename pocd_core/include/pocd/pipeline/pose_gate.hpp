@@ -19,7 +19,8 @@ struct PoseGateConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("max_speed_mps", max_speed_mps, Range{0.01, 100.0}, "Fastest plausible motion of a camera [m/s].");
+    visit("max_speed_mps", max_speed_mps, Range{0.01, 100.0},
+          "Fastest plausible motion of a camera [m/s].");
     visit("max_turn_dps", max_turn_dps, Range{1.0, 10000.0}, "Fastest plausible rotation [deg/s].");
     visit("slack_m", slack_m, Range{0.0, 100.0}, "Jump that is accepted at any rate [m].");
     visit("slack_deg", slack_deg, Range{0.0, 360.0}, "Turn that is accepted at any rate [deg].");

@@ -1,5 +1,5 @@
-// What a class index of the segmentation means. The label map is configuration, never code: data sets
-// order the same classes differently.
+// What a class index of the segmentation means. The label map is configuration, never code: data
+// sets order the same classes differently.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@ namespace pocd {
 
 /// background: mapped, never an object (walls, shelving bolted down, ceiling).
 /// ground: mapped, removed before clustering. object: tracked with a belief.
-/// dynamic: moves by itself (people, trucks): neither mapped nor tracked. ignore: pixels not used at
-/// all (the robot's own body).
+/// dynamic: moves by itself (people, trucks): neither mapped nor tracked. ignore: pixels not used
+/// at all (the robot's own body).
 enum class ClassRole { kBackground, kGround, kObject, kDynamic, kIgnore };
 
 /// "r,g,b" with values 0 to 255; nothing for any other text.
@@ -61,7 +61,8 @@ struct ClassMap {
     visit("default_class", default_class, Range{0, 65535},
           "Class of all pixels when no segmentation image is there.");
     visit("label_divisor", label_divisor, Range{1, 65535},
-          "Pixel value = class * label_divisor + instance (panoptic masks); 1 = the value is the class.");
+          "Pixel value = class * label_divisor + instance (panoptic masks); 1 = the value is the "
+          "class.");
     visit("list", list, "The classes; those not listed are background.");
   }
 };

@@ -8,8 +8,8 @@
 
 namespace pocd {
 
-/// A point of a surface. normal_W is a unit vector towards the side it was seen from, or zero where the
-/// surface was not planar. sigma_m: depth noise at the point.
+/// A point of a surface. normal_W is a unit vector towards the side it was seen from, or zero where
+/// the surface was not planar. sigma_m: depth noise at the point.
 struct SurfacePoint {
   Eigen::Vector3f point_W;
   Eigen::Vector3f normal_W;
@@ -21,8 +21,8 @@ struct Observation {
   ClassId class_id = 0;
   OrientedBox box;
   std::vector<SurfacePoint> points;
-  int pixels = 0;       ///< of the strided grid
-  double area_m2 = 0.0; ///< of the surface seen face on
+  int pixels = 0;        ///< of the strided grid
+  double area_m2 = 0.0;  ///< of the surface seen face on
 };
 
 struct Observations {
@@ -32,19 +32,21 @@ struct Observations {
   static constexpr std::int32_t kNone = -1;
 };
 
-/// Connected components of kObject pixels of one class and instance (organised Euclidean clustering:
-/// image neighbours, also across a gap of one pixel, nearer than the tolerance), small ones dropped,
-/// overlapping ones of one class merged, one class by majority, each with box and thinned points.
-/// Pixels of the ground band right under an observation and of its class are given to it.
+/// Connected components of kObject pixels of one class and instance (organised Euclidean
+/// clustering: image neighbours, also across a gap of one pixel, nearer than the tolerance), small
+/// ones dropped, overlapping ones of one class merged, one class by majority, each with box and
+/// thinned points. Pixels of the ground band right under an observation and of its class are given
+/// to it.
 void extract_observations(const SegmentationConfig& config, const DepthNoise& noise,
                           double spacing_m, const PlaneSegmentation& planes, OrganizedCloud& cloud,
                           Observations& out);
 
 /// Upright box around points: heading in which most upright surface normals are parallel to a side,
 /// the outermost `trim` share of points per axis left out. Where normals (one per point, zero =
-/// unknown) do not agree, the rectangle of least area around the points flattened to the ground gives
-/// the heading; it alone would not do, since two sides of a box seen from a corner span a triangle,
-/// around which several rectangles are least. Sizes of degenerate sets are 0. At least one point.
+/// unknown) do not agree, the rectangle of least area around the points flattened to the ground
+/// gives the heading; it alone would not do, since two sides of a box seen from a corner span a
+/// triangle, around which several rectangles are least. Sizes of degenerate sets are 0. At least
+/// one point.
 OrientedBox fit_box(const Points& points_W, const Points& normals_W, double trim);
 
 /// The published box: heading of the major axis by principal component analysis.

@@ -26,19 +26,21 @@ struct OrganizedCloud {
   std::vector<float> x_W, y_W, z_W;
   std::vector<ClassId> label;  ///< canonical class (ClassTable), voted by planes and clusters later
   std::vector<std::uint16_t> instance;  ///< 0 where masks carry no instances
-  std::vector<PixelKind> kind;  ///< kNone: no return or beyond the depth limit
+  std::vector<PixelKind> kind;          ///< kNone: no return or beyond the depth limit
 
   std::size_t size() const { return depth_m.size(); }
   Eigen::Vector3f point_W(std::size_t i) const { return {x_W[i], y_W[i], z_W[i]}; }
 };
 
-/// ClassMap as a table for pixel loops. Two classes with one name are one class: the one listed first
-/// (masks of one kind of thing may alias between two indices).
+/// ClassMap as a table for pixel loops. Two classes with one name are one class: the one listed
+/// first (masks of one kind of thing may alias between two indices).
 class ClassTable {
  public:
   explicit ClassTable(const ClassMap& map);
   ClassId canonical(ClassId id) const { return id < canonical_.size() ? canonical_[id] : id; }
-  ClassRole role(ClassId id) const { return id < role_.size() ? role_[id] : ClassRole::kBackground; }
+  ClassRole role(ClassId id) const {
+    return id < role_.size() ? role_[id] : ClassRole::kBackground;
+  }
 
  private:
   std::vector<ClassId> canonical_;

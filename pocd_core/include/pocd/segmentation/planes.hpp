@@ -28,28 +28,31 @@ struct PlaneSegmentation {
 };
 
 /// Fits a plane to each cell in inverse depth, where a plane is linear in the pixel coordinates and
-/// stereo noise does not depend on range; grows neighbouring cells of like planes into one (union-find);
-/// refits; gives each pixel near a plane of its own or an adjacent cell to it.
+/// stereo noise does not depend on range; grows neighbouring cells of like planes into one
+/// (union-find); refits; gives each pixel near a plane of its own or an adjacent cell to it.
 void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& config,
                     const DepthNoise& noise, PlaneSegmentation& out);
 
-/// Step 2 of the method: where at least `majority_share` of a plane's pixels agree on a class, all its
-/// pixels get that class (and its kind). Pixels of dynamic and ignored classes neither vote nor change.
+/// Step 2 of the method: where at least `majority_share` of a plane's pixels agree on a class, all
+/// its pixels get that class (and its kind). Pixels of dynamic and ignored classes neither vote nor
+/// change.
 void vote_planes(const PlaneSegmentation& planes, double majority_share, OrganizedCloud& cloud);
 
 /// The ground, kept over frames: the place is flat, and many frames see little of it.
 class GroundModel {
  public:
   /// Looks for the ground among the planes that face up: those whose pixels are mostly of a ground
-  /// class if there are any, else the lowest that is large enough. Then marks as kGround every pixel
-  /// in the band above the plane, and below it; a pixel of a ground class elsewhere becomes background,
-  /// one above `max_height_m` too.
+  /// class if there are any, else the lowest that is large enough. Then marks as kGround every
+  /// pixel in the band above the plane, and below it; a pixel of a ground class elsewhere becomes
+  /// background, one above `max_height_m` too.
   void update(const PlaneSegmentation& planes, const SegmentationConfig& config,
               const DepthNoise& noise, OrganizedCloud& cloud);
 
   bool known() const { return known_; }
   /// Height of point (x, y) of the ground [m], map frame. Only when known().
-  float height_at(float x, float y) const { return (offset_m_ - normal_W_.x() * x - normal_W_.y() * y) / normal_W_.z(); }
+  float height_at(float x, float y) const {
+    return (offset_m_ - normal_W_.x() * x - normal_W_.y() * y) / normal_W_.z();
+  }
 
  private:
   bool known_ = false;

@@ -25,9 +25,11 @@ struct SegmentationConfig {
     visit("plane_max_angle_deg", plane_max_angle_deg, Range{1, 45},
           "Neighbouring planar cells whose normals differ by less grow into one plane [deg].");
     visit("plane_tolerance_m", plane_tolerance_m, Range{0.001, 0.5},
-          "Distance to a plane, added to three sigma of the depth noise, that still counts as on it [m].");
+          "Distance to a plane, added to three sigma of the depth noise, that still counts as on "
+          "it [m].");
     visit("majority_share", majority_share, Range{0.5, 1.0},
-          "Share of a plane's or a cluster's pixels from which its most frequent class is given to all.");
+          "Share of a plane's or a cluster's pixels from which its most frequent class is given to "
+          "all.");
     visit("ground_band_m", ground_band_m, Range{0.0, 0.5},
           "Points up to this height above the ground plane, and all below it, are ground [m].");
     visit("ground_max_tilt_deg", ground_max_tilt_deg, Range{0.5, 45},

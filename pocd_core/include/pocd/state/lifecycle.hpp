@@ -1,4 +1,5 @@
-// Rules of an object's life: how a measurement changes its belief, and when it is removed or has moved.
+// Rules of an object's life: how a measurement changes its belief, and when it is removed or has
+// moved.
 #pragma once
 
 #include <deque>
@@ -12,13 +13,14 @@
 
 namespace pocd {
 
-/// Steps 6 of the method: k by class and kind of measurement, the Bayesian update, the bound v_max, the
-/// cap of alpha + beta, the floor of sigma. Changes object.belief and returns why, without a rule.
+/// Steps 6 of the method: k by class and kind of measurement, the Bayesian update, the bound v_max,
+/// the cap of alpha + beta, the floor of sigma. Changes object.belief and returns why, without a
+/// rule.
 Evidence apply_measurement(LibraryObject& object, double delta_m, const Sighting& sighting,
                            const StateConfig& state, const ChangeConfig& change);
 
-/// The belief after one measurement, as apply_measurement makes it: every published transition can be
-/// recomputed with it from the evidence alone.
+/// The belief after one measurement, as apply_measurement makes it: every published transition can
+/// be recomputed with it from the evidence alone.
 Belief next_belief(const Belief& before, double delta_m, int stationarity_class, double k,
                    const StateConfig& state, const ChangeConfig& change);
 
@@ -48,8 +50,9 @@ class RelocationMemory {
   };
   void remember(const Removed& removed) { removed_.push_back(removed); }
 
-  /// Nearest removed object of this class that `box` may be, seen whole (alike) or in part: then it must
-  /// lie within `reach_m`. Entries older than the window are forgotten. Valid until the next call.
+  /// Nearest removed object of this class that `box` may be, seen whole (alike) or in part: then it
+  /// must lie within `reach_m`. Entries older than the window are forgotten. Valid until the next
+  /// call.
   const Removed* find(ClassId class_id, const OrientedBox& box, StampNs now_ns, double window_s,
                       double reach_m, double slack_m);
   void forget(ObjectId id);

@@ -31,26 +31,32 @@ struct StateConfig {
           "An update that would raise E[v] above this is not applied, v_max.");
     visit("max_count", max_count, Range{1.0, 1e6},
           "Cap of alpha + beta: how much past evidence an object can hold against new evidence.");
-    visit("min_sigma_share", min_sigma_share, Range{0.0, 10.0},
-          "Floor of sigma as a share of tau: how far past measurements can fix the believed change.");
+    visit(
+        "min_sigma_share", min_sigma_share, Range{0.0, 10.0},
+        "Floor of sigma as a share of tau: how far past measurements can fix the believed change.");
     visit("remove_below", remove_below, Range{0.0, 1.0},
           "Objects with E[v] below this are removed from library and map, theta_stat.");
-    visit("k", k, Range{0.0, 100.0},
-          "Weight of the stationarity class where it supports the measurement: movable objects that "
-          "changed, static ones that did not.");
+    visit(
+        "k", k, Range{0.0, 100.0},
+        "Weight of the stationarity class where it supports the measurement: movable objects that "
+        "changed, static ones that did not.");
     visit("confirm_observations", confirm_observations, Range{1, 1000},
           "Observations before a new object is reported as ADDED.");
     visit("tentative_frames", tentative_frames, Range{1, 100000},
-          "A new object that is in view this many frames without being confirmed is forgotten [frames].");
+          "A new object that is in view this many frames without being confirmed is forgotten "
+          "[frames].");
     visit("erode_frames", erode_frames, Range{1, 1000},
-          "A point of an object that is seen through in this many frames in a row is dropped [frames].");
+          "A point of an object that is seen through in this many frames in a row is dropped "
+          "[frames].");
     visit("wait_for_doubt_frames", wait_for_doubt_frames, Range{0, 100000},
-          "How much longer the report of a new object waits while a like one is seen through: both are "
+          "How much longer the report of a new object waits while a like one is seen through: both "
+          "are "
           "one MOVED then [frames].");
     visit("merge_frames", merge_frames, Range{1, 100000},
           "Objects of one class that share an observation in this many frames are one [frames].");
     visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
-          "A removed object and a new one of like class and size within this time are one MOVED [s].");
+          "A removed object and a new one of like class and size within this time are one MOVED "
+          "[s].");
     visit("relocation_reach_m", relocation_reach_m, Range{0.0, 1e6},
           "A new object that is seen only in part is the removed one within this distance [m].");
   }
