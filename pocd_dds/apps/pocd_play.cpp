@@ -26,6 +26,9 @@ void add_replay_options(CLI::App& app, ReplayOptions& replay, std::vector<std::s
   add(app.add_option("--duration", replay.duration_s, "Seconds of the recording to play"))
       ->check(CLI::Range(0.0, 1e9));
   add(app.add_flag("--loop", replay.loop, "Begin again at the end"));
+  add(app.add_option("--readers", replay.readers, "Readers that each topic waited for needs"))
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   add(app.add_option("--wait-for", replay.wait_for,
                      "Pattern of topics whose readers are waited for; default: depth images"))
       ->allow_extra_args(false);

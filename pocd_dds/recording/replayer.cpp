@@ -188,10 +188,10 @@ std::string Replayer::Impl::waiting() const {
   };
   bool named = false;
   for (const auto& [key, writer] : writers) {
-    any = any || writer->matched() > 0;
+    any = any || writer->matched() >= options.readers;
     if (!wanted(topics.at(key))) continue;
     named = true;
-    if (writer->matched() == 0) missing = writer->topic().name;
+    if (writer->matched() < options.readers) missing = writer->topic().name;
   }
   if (named) return missing;
   return any ? "" : "any topic";

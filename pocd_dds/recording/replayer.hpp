@@ -32,6 +32,7 @@ struct ReplayOptions {
   /// Patterns of topics whose readers are waited for; empty: the depth images, or without any in
   /// the recording one reader of any topic.
   std::vector<std::string> wait_for;
+  int readers = 1;  ///< that each of them needs
   bool wait_for_readers = true;
   bool keyboard = false;  ///< the space key on stdin pauses and goes on
 };
