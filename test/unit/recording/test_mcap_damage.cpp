@@ -212,15 +212,15 @@ TEST(McapDefects, ChunksOfZeroLength) {
 }
 
 TEST(McapDefects, DefinitionsCannotFillTheMemory) {
-  // 60 chunks that each unpack to a schema of 4 MB would take 240 MB.
+  // 40 chunks that each unpack to a schema of 2 MB would take 80 MB.
   Bytes bytes(kMcapMagic.begin(), kMcapMagic.end());
   append_record(bytes, Opcode::kHeader, Bytes(8));
   const TemporaryFolder folder;
   McapWriterOptions options;
   options.chunk_bytes = 1;
   McapWriter writer(folder / "a.mcap", options);
-  for (int i = 0; i < 60; ++i) {
-    const auto schema = writer.add_schema("a", "ros2msg", std::string(4u << 20, 'a'));
+  for (int i = 0; i < 40; ++i) {
+    const auto schema = writer.add_schema("a", "ros2msg", std::string(2u << 20, 'a'));
     const auto channel = writer.add_channel(schema, "/t" + std::to_string(i), "cdr", {});
     writer.write({channel, 0, 1, 1}, bytes.data(), 1);
   }
