@@ -14,8 +14,8 @@ namespace pocd::recording {
 OutputFile::OutputFile(const std::filesystem::path& path) : path_(path) {
   fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd_ < 0) {
-    throw InputError(path_.string() + ": cannot be created: " +
-                     std::system_category().message(errno));
+    throw InputError(path_.string() +
+                     ": cannot be created: " + std::system_category().message(errno));
   }
 }
 
