@@ -48,6 +48,9 @@ void note(const FrameResult& result, std::size_t frame,
     c.run.events.push_back({event, frame});
     c.score.removed_or_moved +=
         event.kind == EventKind::kRemoved || event.kind == EventKind::kMoved;
+    if (event.kind == EventKind::kRemoved) {
+      c.score.histories[event.object].emplace_back(frame, event.evidence.after.stationarity());
+    }
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
     c.score.histories[object.id].emplace_back(frame, object.belief.stationarity());

@@ -91,6 +91,23 @@ TEST(Evaluation, NothingIsRemovedOrMovedWhereNothingChanges) {
   EXPECT_GT(run.methods[0].by_truth->precision(), 97.0);
 }
 
+TEST(Evaluation, WithoutTruthOnlyTheReferenceIsThere) {
+  const PipelineConfig config = simulated_config();
+  const Scenario scenario = hall(true);
+  EvaluationInput input;
+  input.route = "recording";
+  input.visit_begin = {0, SimSchedule(scenario).frames().size() / 2};
+  SimReaderOptions options;
+  options.with_color = false;
+  input.reader = std::make_unique<SimReader>(scenario, options);
+  const RunScore run =
+      evaluate_run(std::move(input), {{"fixed", [=] { return make_static_tsdf_method(config); }}},
+                   VoxelMetricsConfig(), 3.0);
+  EXPECT_FALSE(run.methods[0].by_truth);
+  EXPECT_GT(run.methods[0].by_reference.recall(), 80.0);
+  EXPECT_LT(run.methods[0].by_reference.precision(), 97.0) << "it still holds what was taken away";
+}
+
 TEST(Evaluation, RunsRepeatExactly) {
   const PipelineConfig config = simulated_config();
   const RunScore a = evaluate(hall(true), all_methods(config), 3),

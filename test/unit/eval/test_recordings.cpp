@@ -23,11 +23,11 @@ TEST(Recordings, TableTopHoldsExactlyWhatIsThereAfterEachState) {
   PipelineConfig config;
   load_config(config, {kSource / "config/tabletop.yaml"});
   const StateRun run = run_states(truth, folder, config, [](const StateRun& so_far) {
-    if (!so_far.verdicts.back().ok_box) std::cout << describe_last_state(so_far);
+    if (!so_far.verdicts.back().ok_listed) std::cout << describe_last_state(so_far);
   });
   ASSERT_EQ(run.verdicts.size(), 11u);
   int right = 0;
-  for (const StateVerdict& verdict : run.verdicts) right += verdict.ok_box;
+  for (const StateVerdict& verdict : run.verdicts) right += verdict.ok_listed;
   EXPECT_GE(right, 9);
 }
 
