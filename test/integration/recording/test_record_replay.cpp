@@ -90,6 +90,8 @@ std::string replayed_digest(const fs::path& recording, const std::vector<std::st
   play.insert(play.end(), speed.begin(), speed.end());
   const CommandResult played = run_command(play);
   EXPECT_EQ(played.exit_code, 0) << played.err;
+  // A run this short could be over before the mirror has heard of the node.
+  EXPECT_TRUE(says(mirror, "in step with publisher"));
   stop(node);
   const CommandResult mirrored = mirror.wait();
   EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err;
@@ -264,6 +266,7 @@ TEST(SameMap, ALiveRunWithDroppedFramesFromItsRecording) {
   }
   const CommandResult played = run_command(play);
   ASSERT_EQ(played.exit_code, 0) << played.err;
+  ASSERT_TRUE(says(mirror, "in step with publisher"));
   const CommandResult ended = stop(node);
   const CommandResult mirrored = mirror.wait();
   EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err;
