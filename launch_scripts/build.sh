@@ -33,7 +33,8 @@ jobs=$(nproc)
 ((jobs > available_gb / 2)) && jobs=$((available_gb / 2))
 ((jobs < 1)) && jobs=1
 
-export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs
+# MAKEFLAGS keeps colcon from adding a limit by load average, which on a busy machine means one job.
+export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs MAKEFLAGS="-j$jobs"
 if ! colcon --log-level error build --merge-install --executor sequential "${selection[@]}" \
   --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "$@"; then
   # Ninja reports compiler errors on stdout, which colcon keeps in a file.
