@@ -11,6 +11,8 @@ namespace {
 /// at least so many of them.
 constexpr double kSharedShare = 0.5;
 constexpr int kSharedPoints = 10;
+/// An object measured so short a time ago is in its place.
+constexpr StampNs kInPlaceNs = 2'000'000'000;
 /// An object that turned up did so on a later drive than the one on which another was last seen if
 /// the time between is this many times what has passed since.
 constexpr StampNs kSameDrive = 3;
@@ -124,9 +126,26 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
 
 const RelocationMemory::Removed* ObjectTracker::removed_like(const Step& step,
                                                              const LibraryObject& object) {
-  return relocations_.find(object.class_id, object.box, step.frame.stamp_ns,
-                           config_.state.relocation_window_s, config_.state.relocation_reach_m,
-                           like_size_slack_m());
+  const RelocationMemory::Removed* removed = relocations_.find(
+      object.class_id, object.box, step.frame.stamp_ns, config_.state.relocation_window_s,
+      config_.state.relocation_reach_m, like_size_slack_m());
+  return removed && !has_nearer_claim(step, object, removed->id, removed->box) ? removed : nullptr;
+}
+
+bool ObjectTracker::has_nearer_claim(const Step& step, const LibraryObject& found,
+                                     ObjectId claimant, const OrientedBox& old_place) const {
+  const Eigen::Vector3d& here_W = found.box.pose.position_W;
+  const double distance = (old_place.pose.position_W - here_W).head<2>().norm();
+  for (const ObjectId id : library_.near(here_W, distance)) {
+    const LibraryObject& other = *library_.find(id);
+    const bool unseen = step.frame.stamp_ns - other.last_seen_ns > kInPlaceNs;
+    if (id == claimant || id == found.id || !other.confirmed || !unseen ||
+        other.class_id != found.class_id || other.first_seen_ns >= found.first_seen_ns) {
+      continue;
+    }
+    if ((other.box.pose.position_W - here_W).head<2>().norm() < distance) return true;
+  }
+  return false;
 }
 
 void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id,
@@ -150,22 +169,30 @@ LibraryObject* ObjectTracker::added_like(const Step& step, const LibraryObject& 
   LibraryObject* best = nullptr;
   double best_distance = 0.0;
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
-  for (const ObjectId id :
-       library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
+  const double reach_m = config_.state.relocation_reach_m;
+  for (const ObjectId id : library_.near(object.box.pose.position_W, reach_m)) {
     LibraryObject* other = library_.find(id);
     if (other == &object || !other->added_ns ||
         step.frame.stamp_ns - *other->added_ns > window_ns || other->class_id != object.class_id ||
-        !alike(other->box, object.box, like_size_slack_m())) {
+        !may_be(*other, object)) {
       continue;
     }
     // What was found on the same drive as the object itself is not where it went.
     const StampNs between_ns = other->first_seen_ns - object.last_seen_ns;
     if (between_ns <= kSameDrive * (step.frame.stamp_ns - other->first_seen_ns)) continue;
     const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
-    if (distance > config_.state.relocation_reach_m) continue;
+    if (distance > reach_m || has_nearer_claim(step, *other, object.id, object.box)) continue;
     if (!best || distance < best_distance) best = other, best_distance = distance;
   }
   return best;
+}
+
+bool ObjectTracker::may_be(const LibraryObject& found, const LibraryObject& known) const {
+  if (alike(found.box, known.box, like_size_slack_m())) return true;
+  // What is not seen whole yet may still grow into the size.
+  const double distance = (found.box.pose.position_W - known.box.pose.position_W).norm();
+  return found.growing && distance <= config_.state.relocation_reach_m &&
+         fits_inside(found.box, known.box, like_size_slack_m());
 }
 
 LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject& object) {
@@ -178,9 +205,7 @@ LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject
       continue;
     }
     const double distance = (other->box.pose.position_W - object.box.pose.position_W).norm();
-    const bool part = other->growing && distance <= config_.state.relocation_reach_m &&
-                      fits_inside(other->box, object.box, like_size_slack_m());
-    if (!part && !alike(other->box, object.box, like_size_slack_m())) continue;
+    if (!may_be(*other, object) || has_nearer_claim(step, *other, object.id, object.box)) continue;
     const bool named = other->moved_from == object.id,
                best_named = best && best->moved_from == object.id;
     if (!best || (named && !best_named) || (named == best_named && distance < best_distance)) {
@@ -194,17 +219,10 @@ LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject
 void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule) {
   LibraryObject& object = *library_.find(id);
   LibraryObject* successor = object.confirmed ? new_place_of(step, object) : nullptr;
-  LibraryObject* elsewhere = object.confirmed && !successor ? added_like(step, object) : nullptr;
-  if (elsewhere) {
-    // Seen at its new place before the old one was seen empty.
-    elsewhere->added_ns.reset();
-    step.result.retired.push_back(id);
-    ObjectEvent& event =
-        add_event(step, EventKind::kMoved, *elsewhere, "was_" + std::to_string(to_index(id)));
-    event.previous_box = object.box;
-    event.evidence = step.evidence[id];
-    event.evidence.rule = "was_" + std::to_string(to_index(id));
-  } else if (object.confirmed && !successor) {
+  // It may have been seen at its new place before the old one was seen empty.
+  if (object.confirmed && !successor) successor = added_like(step, object);
+  if (successor && successor->confirmed) step.result.retired.push_back(successor->id);
+  if (object.confirmed && !successor) {
     add_event(step, EventKind::kRemoved, object, rule);
     step.result.retired.push_back(id);
     relocations_.remember(
@@ -221,6 +239,7 @@ void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule) {
   const Evidence evidence = step.evidence[id];
   take_identity(step, *successor, id, first_seen_ns);
   successor->confirmed = true;
+  successor->added_ns.reset();
   successor->reported_box = successor->box;
   successor->gained = successor->lost = 0;
   step.evidence[id] = evidence;

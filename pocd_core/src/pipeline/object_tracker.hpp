@@ -54,6 +54,12 @@ class ObjectTracker {
   LibraryObject* added_like(const Step& step, const LibraryObject& object);
   /// What was removed and looks like this object, or null.
   const RelocationMemory::Removed* removed_like(const Step& step, const LibraryObject& object);
+  /// Whether a new object may be a known one elsewhere, by its size.
+  bool may_be(const LibraryObject& found, const LibraryObject& known) const;
+  /// Whether another known object, not seen in its place lately, was nearer to where this one was
+  /// found.
+  bool has_nearer_claim(const Step& step, const LibraryObject& found, ObjectId claimant,
+                        const OrientedBox& old_place) const;
   void mark_changed(LibraryObject& object);
   void confirm(Step& step, LibraryObject& object);
   void remove(Step& step, ObjectId id, const std::string& rule);
