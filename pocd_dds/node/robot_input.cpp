@@ -169,6 +169,8 @@ void RobotInput::add_image(Stream stream, const sensor_msgs::msg::Image& message
     problems_.count(topic, *problem);
     return;
   }
+  segmentation_delivers_ = segmentation_delivers_ || stream == Stream::kSegmentation;
+  color_delivers_ = color_delivers_ || stream == Stream::kColor;
   if (stream == Stream::kDepth && !camera_frame_known_) {
     if (message.header().frame_id().empty()) {
       problems_.count(topic, {InputReason::kEmptyFrameName, "header.frame_id is empty"});
@@ -191,10 +193,11 @@ InputProblem RobotInput::backwards(const std_msgs::msg::Header& header) {
 }
 
 std::vector<Frame> RobotInput::take(bool last_call) {
-  // A stream that is only optional and that nobody publishes is not worth an endless wait.
-  const bool segmentation_comes =
-      !segmentation_ || segmentation_required_ || segmentation_->matched() > 0;
-  const bool color_comes = !color_ || color_required_ || color_->matched() > 0;
+  // An optional stream is worth an endless wait only once it has delivered: an announced topic may
+  // stay silent.
+  const bool segmentation_comes = !segmentation_ || segmentation_required_ ||
+                                  (segmentation_delivers_ && segmentation_->matched() > 0);
+  const bool color_comes = !color_ || color_required_ || (color_delivers_ && color_->matched() > 0);
   synchronizer_.set_patient(lossless_ && segmentation_comes && color_comes);
 
   std::vector<Frame> frames;
@@ -218,6 +221,7 @@ std::vector<Frame> RobotInput::take(bool last_call) {
 bool RobotInput::settle_departure() {
   if (!source_left_) return false;
   had_source_ = source_left_ = false;
+  segmentation_delivers_ = color_delivers_ = false;
   synchronizer_.restart();
   transforms_.forget_moving();
   return true;

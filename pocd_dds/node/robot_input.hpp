@@ -72,6 +72,7 @@ class RobotInput {
   std::uint64_t frames_ = 0;
   std::uint64_t refused_ = 0;
   bool segmentation_required_ = false, color_required_ = false;
+  bool segmentation_delivers_ = false, color_delivers_ = false;
 
   Reader<nav_msgs::msg::OdometryPubSubType> odometry_;
   Reader<sensor_msgs::msg::CameraInfoPubSubType> camera_info_;

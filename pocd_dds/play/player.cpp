@@ -55,7 +55,7 @@ std::optional<cv::Mat> exact_millimetres(const cv::Mat& depth_m) {
 class Player::Robot {
  public:
   Robot(const PlayOptions& options, const std::shared_ptr<Participant>& participant,
-        const std::string& name, const CameraExtrinsics& extrinsics)
+        const std::string& name, const CameraExtrinsics& extrinsics, const Frame& first)
       : map_frame_(options.map_frame),
         base_frame_(name + "/" + extrinsics.base_frame),
         camera_frame_(name + "/" + extrinsics.camera_frame),
@@ -65,11 +65,13 @@ class Player::Robot {
         camera_info_(participant, topics::kCameraInfo,
                      robot_topic(options.topics.camera_info, name),
                      options.lossless ? kLossless : kImages),
-        segmentation_(participant, topics::kSegmentation,
-                      robot_topic(options.topics.segmentation, name),
-                      options.lossless ? kLossless : kImages),
-        color_(participant, topics::kColor, robot_topic(options.topics.color, name),
-               options.lossless ? kLossless : kImages),
+        segmentation_(first.labels.empty()
+                          ? nullptr
+                          : image_writer(options, participant, name, topics::kSegmentation,
+                                         options.topics.segmentation)),
+        color_(first.color.empty() ? nullptr
+                                   : image_writer(options, participant, name, topics::kColor,
+                                                  options.topics.color)),
         depth_(participant, topics::kDepth, robot_topic(options.topics.depth, name),
                options.lossless ? kLossless : kImages),
         tf_static_(participant, topics::kTfStatic, topics::kTfStatic.name, kStatic) {}
@@ -93,18 +95,18 @@ class Player::Robot {
     odometry_.write(odometry);
     auto info = camera_message(frame.camera, frame.stamp_ns, camera_frame_);
     camera_info_.write(info);
-    if (!frame.labels.empty()) {
+    if (segmentation_ && !frame.labels.empty()) {
       double largest = 0.0;
       cv::minMaxLoc(frame.labels, nullptr, &largest);
       cv::Mat labels = frame.labels;
       if (largest < 256) frame.labels.convertTo(labels, CV_8U);
       auto message =
           image_message(labels, largest < 256 ? "mono8" : "mono16", frame.stamp_ns, camera_frame_);
-      segmentation_.write(message);
+      segmentation_->write(message);
     }
-    if (!frame.color.empty() && color_.matched() > 0) {
+    if (color_ && !frame.color.empty() && color_->matched() > 0) {
       auto message = image_message(frame.color, "bgr8", frame.stamp_ns, camera_frame_);
-      color_.write(message);
+      color_->write(message);
     }
     const std::optional<cv::Mat> millimetres = exact_millimetres(frame.depth_m);
     auto depth = image_message(millimetres ? *millimetres : frame.depth_m,
@@ -114,11 +116,20 @@ class Player::Robot {
 
   bool acknowledged(const Until& until) {
     return acknowledged(odometry_, until) && acknowledged(camera_info_, until) &&
-           acknowledged(segmentation_, until) && acknowledged(color_, until) &&
-           acknowledged(depth_, until);
+           (!segmentation_ || acknowledged(*segmentation_, until)) &&
+           (!color_ || acknowledged(*color_, until)) && acknowledged(depth_, until);
   }
 
  private:
+  using ImageWriter = Writer<sensor_msgs::msg::ImagePubSubType>;
+
+  static std::unique_ptr<ImageWriter> image_writer(const PlayOptions& options,
+                                                   const std::shared_ptr<Participant>& participant,
+                                                   const std::string& name, const TopicSpec& spec,
+                                                   const std::string& pattern) {
+    return std::make_unique<ImageWriter>(participant, spec, robot_topic(pattern, name),
+                                         options.lossless ? kLossless : kImages);
+  }
   template <class AnyWriter>
   static bool acknowledged(AnyWriter& writer, const Until& until) {
     while (!until.over()) {
@@ -131,7 +142,10 @@ class Player::Robot {
   Pose T_B_C_;
   Writer<nav_msgs::msg::OdometryPubSubType> odometry_;
   Writer<sensor_msgs::msg::CameraInfoPubSubType> camera_info_;
-  Writer<sensor_msgs::msg::ImagePubSubType> segmentation_, color_, depth_;
+  // Null where the source has no such images: an announced topic that stays silent would be waited
+  // for.
+  std::unique_ptr<ImageWriter> segmentation_, color_;
+  ImageWriter depth_;
   Writer<tf2_msgs::msg::TFMessagePubSubType> tf_static_;
 };
 
@@ -147,10 +161,11 @@ Player::Player(const PlayOptions& options)
 
 Player::~Player() = default;
 
-Player::Robot& Player::robot(const std::string& name, const std::atomic<bool>& stop) {
+Player::Robot& Player::robot(const std::string& name, const Frame& first,
+                             const std::atomic<bool>& stop) {
   std::unique_ptr<Robot>& robot = robots_[name];
   if (robot) return *robot;
-  robot = std::make_unique<Robot>(options_, participant_, name, reader_->extrinsics());
+  robot = std::make_unique<Robot>(options_, participant_, name, reader_->extrinsics(), first);
   if (options_.wait_for_readers) {
     if (!robot->has_readers()) spdlog::info("waiting for a reader of {}", robot->depth_topic());
     while (!robot->has_readers() && !stop) std::this_thread::sleep_for(kPoll);
@@ -172,7 +187,7 @@ PlayResult Player::run(const std::atomic<bool>& stop) {
     if (!frame) break;
     const std::string name = frame->robot.empty() ? options_.robot : frame->robot;
     const auto before = Clock::now();
-    Robot& out = robot(name, stop);
+    Robot& out = robot(name, *frame, stop);
     if (!first_ns) {
       first_ns = frame->stamp_ns;
       start = Clock::now();

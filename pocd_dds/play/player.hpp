@@ -50,7 +50,7 @@ class Player {
 
  private:
   class Robot;
-  Robot& robot(const std::string& name, const std::atomic<bool>& stop);
+  Robot& robot(const std::string& name, const Frame& first, const std::atomic<bool>& stop);
 
   PlayOptions options_;
   std::shared_ptr<Participant> participant_;
