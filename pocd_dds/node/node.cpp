@@ -148,7 +148,7 @@ bool Node::Impl::finish() {
   // A late subscriber that asked for a snapshot just now still gets it.
   map.answer_requests();
   const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait) &&
-                            frames.wait_acknowledged(wait);
+                            frames.wait_acknowledged(wait) && status.wait_acknowledged(wait);
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
   return acknowledged && counts.write_failures == 0;
 }

@@ -30,6 +30,8 @@ class StatusPublication {
 
   void send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
             std::uint64_t queue_dropped, const std::string& state);
+  /// Health only: it says how the node ended.
+  bool wait_acknowledged(std::chrono::milliseconds time) { return health_.wait_acknowledged(time); }
 
  private:
   std::string name_;

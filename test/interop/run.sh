@@ -41,8 +41,16 @@ wait_for "recording on domain" record.log
 node_pid=$!
 pids+=("$node_pid")
 wait_for "recording /pocd/objects/markers" record.log
-"$bin/pocd_play" --dataset sim --input "$here/../../config/sim/demo.yaml" --max-frames 60 --clock \
-  >play.log 2>&1 || { cat play.log; exit 1; }
+# The player waits for the node only; the run is long enough for the recorder to find every topic.
+"$bin/pocd_play" --dataset sim --input "$here/../../config/sim/demo.yaml" --max-frames 300 --clock \
+  >play.log 2>&1 &
+player=$!
+pids+=("$player")
+for topic in /robot1/depth/image_raw /robot1/segmentation /robot1/odom /robot2/depth/camera_info \
+  /tf_static /clock; do
+  wait_for "recording $topic" record.log
+done
+wait "$player" || { cat play.log; exit 1; }
 kill -TERM "$node_pid" && wait "$node_pid" || { cat node.log; exit 1; }
 kill -TERM "$recorder" && wait "$recorder" || { cat record.log; exit 1; }
 pids=()
