@@ -10,7 +10,7 @@ namespace {
 
 enum class Fault { kPoseJump, kMaskGap, kDepthHoles };
 
-constexpr double kFrame_s = 1.0 / 15.0;  // a jump lasts one to five frames at this rate
+constexpr double kFrame_s = 1.0 / 15.0;  // a jump lasts one to five periods
 
 void punch_holes(Random& random, double share, cv::Mat& depth_m) {
   depth_m = depth_m.clone();  // frames share their images

@@ -1,7 +1,6 @@
 // The static-world baseline (Kimera in the paper's table): Voxblox's TSDF update, which knows no
 // change. A surface that is gone only fades as far as the running average forgets. The cap of the
-// weight is Voxblox's default of 10000, in effect none; the weight that a surface needs to count is
-// tuned.
+// weight is Voxblox's default of 10000, in effect none. Not tuned.
 #include "naive_tsdf.hpp"
 #include "pocd/eval/mapping_method.hpp"
 

@@ -9,7 +9,7 @@ namespace pocd {
 
 struct FaultOptions {
   /// Every `period_s` seconds of a robot's stream, alternating over the chosen faults:
-  bool pose_jumps = false;   ///< 0.3 m sideways, for one to five frames
+  bool pose_jumps = false;   ///< 0.3 m sideways, for one to six frames
   bool mask_gaps = false;    ///< 2 s without segmentation
   bool depth_holes = false;  ///< half of the pixels without a return, for 2 s
   double period_s = 6.0;
