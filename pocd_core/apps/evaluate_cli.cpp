@@ -2,12 +2,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include "evaluation_methods.hpp"
+
 namespace pocd {
 namespace {
 
-const std::vector<std::string> kMethods{
-    "pocd",    "static_tsdf",     "tracked_objects", "tracked_objects_keep",
-    "submaps", "voxel_correction"};
 const std::vector<std::string> kDefaultMethods{"pocd", "static_tsdf", "tracked_objects",
                                                "voxel_correction", "submaps"};
 const std::vector<std::string> kFaults{"pose_jumps", "mask_gaps", "depth_holes"};
@@ -40,9 +39,12 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
       ->allow_extra_args(false);
   app.add_option("--methods", o.methods, "Methods, separated by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember(kMethods));
+      ->check(CLI::IsMember(method_names()));
   app.add_option("--variant", o.variants,
                  "Our method with an overlay: NAME=FILE or NAME=GROUP.KEY=VALUE[,GROUP.KEY=VALUE]")
+      ->allow_extra_args(false);
+  app.add_option("--variants", o.variant_files,
+                 "File with variants of any method, as config/evaluation/ablation.yaml")
       ->allow_extra_args(false);
   app.add_option("--seeds", o.seeds, "Seeds of the simulator's noise, separated by commas")
       ->delimiter(',')
@@ -60,6 +62,9 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
       ->required();
   app.add_option("--jobs", o.jobs, "Routes evaluated at the same time")->check(CLI::Range(1, 64));
   app.add_flag("--quick", o.quick, "Few scenarios, one seed");
+  app.add_flag("!--no-reference", o.with_reference,
+               "Leave out the map of the last visit alone and the columns that need it: a third "
+               "less work");
   app.add_flag("!--no-pictures", o.pictures, "Tables only");
   app.add_option("--voxel-size", o.voxel_size_m, "Voxels that are compared [m]")
       ->check(CLI::Range(0.01, 10.0))
@@ -72,16 +77,10 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
   try {
     app.parse(argc, argv);
     if (!o.dataset.empty() && o.inputs.empty()) throw CLI::RequiredError("--input");
-    for (const std::string& variant : o.variants) {
-      const std::size_t equals = variant.find('=');
-      if (equals == 0 || equals == std::string::npos || equals + 1 == variant.size()) {
-        throw CLI::ValidationError("--variant", "\"" + variant + "\" is not NAME=OVERLAY");
-      }
-    }
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  if (o.methods.empty()) o.methods = kDefaultMethods;
+  if (o.methods.empty() && o.variant_files.empty()) o.methods = kDefaultMethods;
   if (o.quick) {
     if (o.names.empty()) o.names = {"0", "1-5", "2-2", "4-1"};
     o.seeds.resize(1);

@@ -17,6 +17,7 @@ struct EvaluateOptions {
   std::vector<std::filesystem::path> inputs;
   std::vector<std::string> methods;
   std::vector<std::string> variants;  ///< NAME=FILE or NAME=GROUP.KEY=VALUE,...
+  std::vector<std::filesystem::path> variant_files;
   std::vector<std::uint64_t> seeds = {1, 2, 3};
   std::vector<std::string> faults;
   std::vector<std::filesystem::path> config;
@@ -25,6 +26,7 @@ struct EvaluateOptions {
   int jobs = 1;
   bool quick = false;
   bool pictures = true;
+  bool with_reference = true;
   double voxel_size_m = 0.2;
   double min_height_m = 0.1, max_height_m = 4.0;
 };

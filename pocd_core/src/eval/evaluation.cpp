@@ -17,7 +17,7 @@ double cpu_ms() {
 /// Measured depth within this of a voxel's own still is that voxel: two voxels of the map.
 constexpr double kSeenMargin_voxels = 2.0;
 /// Measured frames that are added to the observed region of a recording.
-constexpr std::size_t kRegionStride = 3;
+constexpr int kRegionStride = 3;
 
 /// A method on the whole route, and on the last visit alone.
 struct Contestant {
@@ -71,7 +71,7 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
     contestants.emplace_back();
     contestants.back().score.method = spec.name;
     contestants.back().route = spec.make();
-    contestants.back().alone = spec.make();
+    if (input.with_reference) contestants.back().alone = spec.make();
   }
   ObservedRegion measured(voxels.map_voxel_m, max_depth_m, kSeenMargin_voxels * voxels.map_voxel_m);
   const std::size_t last = input.visit_begin.size() - 1;
@@ -81,8 +81,8 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
   while (auto frame = input.reader->next()) {
     if (!start_ns) start_ns = frame->stamp_ns;
     const std::size_t visit = visit_of(frame->sequence, input.visit_begin);
-    if (visit == last && last_frames % kRegionStride == 0) {
-      for (std::size_t n = 0; n < kRegionStride; ++n) measured.add(*frame);
+    if (input.with_reference && visit == last && last_frames % kRegionStride == 0) {
+      measured.add(*frame, kRegionStride);
     }
     inject_faults(input.faults, *start_ns, *frame);
     if (input.truth && places.size() != visit + 1) places = places_until(*input.truth, visit);
@@ -94,7 +94,7 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
       const FrameResult result = c.route->process(*frame);
       c.cpu_total_ms += cpu_ms() - before_ms;
       note(result, static_cast<std::size_t>(frame->sequence), places, c);
-      if (visit == last) c.alone->process(*frame);
+      if (visit == last && c.alone) c.alone->process(*frame);
     }
     last_frames += visit == last;
     ++frames;
@@ -108,7 +108,9 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
   run.problems = input.reader->problems();
   for (Contestant& c : contestants) {
     const Points map_W = c.route->surface();
-    c.score.by_reference = score_against_reference(map_W, c.alone->surface(), measured, voxels);
+    if (c.alone) {
+      c.score.by_reference = score_against_reference(map_W, c.alone->surface(), measured, voxels);
+    }
     if (input.truth) {
       c.score.by_truth =
           score_against_truth(map_W, input.truth->surface, input.truth->observed, voxels);

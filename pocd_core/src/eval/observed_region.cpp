@@ -14,7 +14,7 @@ std::int32_t block_of(std::int32_t voxel) {
 
 }  // namespace
 
-void ObservedRegion::add(const Frame& frame) {
+void ObservedRegion::add(const Frame& frame, int frames) {
   const CameraModel& camera = frame.camera;
   const double block_m = voxel_size_m_ * kSide;
   Eigen::Vector3d low = frame.T_W_C.translation(), high = low;
@@ -54,7 +54,7 @@ void ObservedRegion::add(const Frame& frame) {
           }
           Voxel& now = block->voxels[static_cast<std::size_t>(i)];
           std::uint16_t& count = depth <= p_C.z() + margin_m_ ? now.seen : now.seen_through;
-          if (count < 65535) ++count;
+          count = static_cast<std::uint16_t>(std::min(count + frames, 65535));
         }
       }
     }

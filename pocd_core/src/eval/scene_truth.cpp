@@ -172,7 +172,7 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
       continue;
     frame.camera = half;
     frame.depth_m = render(scene, half, frame.T_W_C, false, pool).depth_m;
-    for (int n = 0; n < options.frame_stride; ++n) truth.observed.add(frame);
+    truth.observed.add(frame, options.frame_stride);
   }
   truth.visit_begin.push_back(schedule.frames().size());
   for (std::size_t c = 0; c < truth.changes.size(); ++c) {

@@ -17,18 +17,9 @@
 namespace pocd {
 namespace {
 
-constexpr float kMaxWeight = 10000.0f, kMinWeight = 0.5f;
-constexpr int kInactiveAfterFrames = 15;  // one second
-constexpr int kConfirmFrames = 3;
-constexpr double kSameThing = 0.3;  // share of an observation that an active submap explains
-// Of the points that were compared. Chosen by reasoning, not tuned: noise and pose error put a few
-// percent of a surface in conflict, half of a shifted stack is more than a third.
-constexpr double kConflictShare = 0.3;
-constexpr double kMatchShare = 0.5;
-constexpr double kComparedShare = 0.2;  // of a submap's points, before anything is decided
-
 struct Submap {
-  explicit Submap(const PipelineConfig& config) : grid(config.map, kMaxWeight) {}
+  Submap(const TsdfConfig& config, double max_weight)
+      : grid(config, static_cast<float>(max_weight)) {}
 
   ObjectId id = ObjectId::kNone;
   ClassId class_id = 0;
@@ -44,8 +35,12 @@ struct Submap {
 
 class SubmapMethod final : public MappingMethod {
  public:
-  explicit SubmapMethod(const PipelineConfig& config)
-      : config_(config), perception_(config), background_(config.map, kMaxWeight) {}
+  SubmapMethod(const PipelineConfig& config, const SubmapsConfig& own)
+      : config_(config),
+        own_(own),
+        min_weight_(static_cast<float>(own.min_weight)),
+        perception_(config),
+        background_(config.map, static_cast<float>(own.max_weight)) {}
 
   FrameResult process(const Frame& frame) override {
     FrameResult result;
@@ -53,7 +48,7 @@ class SubmapMethod final : public MappingMethod {
     const std::vector<Submap*> owner = assign_observations(observations);
     integrate(frame, observations, owner);
     for (auto& submap : submaps_) {
-      if (submap->active && submap->frames == kConfirmFrames && submap->missed == 0 &&
+      if (submap->active && submap->frames == own_.confirm_frames && submap->missed == 0 &&
           is_new(*submap)) {
         report(EventKind::kAdded, *submap, frame, result);
       }
@@ -64,10 +59,10 @@ class SubmapMethod final : public MappingMethod {
   }
 
   Points surface() const override {
-    Points points = background_.surface(kMinWeight);
+    Points points = background_.surface(min_weight_);
     for (const auto& submap : submaps_) {
-      if (submap->frames < kConfirmFrames) continue;
-      const Points own = submap->grid.surface(kMinWeight);
+      if (submap->frames < own_.confirm_frames) continue;
+      const Points own = submap->grid.surface(min_weight_);
       points.insert(points.end(), own.begin(), own.end());
     }
     return points;
@@ -78,7 +73,7 @@ class SubmapMethod final : public MappingMethod {
   std::vector<ObjectSnapshot> objects() const override {
     std::vector<ObjectSnapshot> list;
     for (const auto& submap : submaps_) {
-      if (submap->frames >= kConfirmFrames) list.push_back(submap->object);
+      if (submap->frames >= own_.confirm_frames) list.push_back(submap->object);
     }
     return list;
   }
@@ -90,7 +85,7 @@ class SubmapMethod final : public MappingMethod {
     const std::size_t known = submaps_.size();
     for (std::size_t n = 0; n < observations.list.size(); ++n) {
       const Observation& observation = observations.list[n];
-      double best = kSameThing;
+      double best = own_.same_thing_share;
       for (std::size_t s = 0; s < known; ++s) {
         Submap& submap = *submaps_[s];
         if (!submap.active || submap.class_id != observation.class_id) continue;
@@ -98,7 +93,7 @@ class SubmapMethod final : public MappingMethod {
         if (share > best) best = share, owner[n] = &submap;
       }
       if (owner[n]) continue;
-      submaps_.push_back(std::make_unique<Submap>(config_));
+      submaps_.push_back(std::make_unique<Submap>(config_.map, own_.max_weight));
       owner[n] = submaps_.back().get();
       owner[n]->id = ObjectId{next_id_++};
       owner[n]->class_id = observation.class_id;
@@ -141,7 +136,7 @@ class SubmapMethod final : public MappingMethod {
       submap->grid.integrate(frame, paint(submap.get()));
       submap->missed = 0;
       ++submap->frames;
-      if (submap->frames == kConfirmFrames || submap->frames % 10 == 0) refresh(*submap);
+      if (submap->frames == own_.confirm_frames || submap->frames % 10 == 0) refresh(*submap);
     }
   }
 
@@ -169,7 +164,7 @@ class SubmapMethod final : public MappingMethod {
               static_cast<int>(std::floor(p_C.y() / p_C.z() * camera.fy + camera.cy + 0.5));
           if (u >= 0 && v >= 0 && u < camera.width && v < camera.height) {
             const double depth = frame.depth_m.at<float>(v, u);
-            const double margin = config_.map.voxel_size_m * 2.0;
+            const double margin = config_.map.voxel_size_m * own_.margin_voxels;
             if (depth > 0.0 && std::abs(depth - p_C.z()) <= margin) said = 1;
             if (depth > p_C.z() + margin) said = 2;
           }
@@ -177,10 +172,10 @@ class SubmapMethod final : public MappingMethod {
         match += said == 1, conflict += said == 2;
       }
       const auto compared = static_cast<double>(match + conflict);
-      if (compared < kComparedShare * static_cast<double>(submap->points_W.size()) ||
+      if (compared < own_.compared_share * static_cast<double>(submap->points_W.size()) ||
           compared < 10.0)
         continue;
-      if (static_cast<double>(conflict) > kConflictShare * compared) {
+      if (static_cast<double>(conflict) > own_.conflict_share * compared) {
         report(EventKind::kRemoved, *submap, frame, result);
         submap->frames = 0;
       }
@@ -191,21 +186,21 @@ class SubmapMethod final : public MappingMethod {
   void drop_discarded() {
     submaps_.erase(
         std::remove_if(submaps_.begin(), submaps_.end(),
-                       [](const auto& s) { return !s->active && s->frames < kConfirmFrames; }),
+                       [&](const auto& s) { return !s->active && s->frames < own_.confirm_frames; }),
         submaps_.end());
   }
 
   void deactivate() {
     for (auto& submap : submaps_) {
-      if (!submap->active || submap->missed <= kInactiveAfterFrames) continue;
+      if (!submap->active || submap->missed <= own_.inactive_after_frames) continue;
       submap->active = false;
-      if (submap->frames < kConfirmFrames) continue;
+      if (submap->frames < own_.confirm_frames) continue;
       refresh(*submap);
-      submap->points_W = submap->grid.surface(kMinWeight);
+      submap->points_W = submap->grid.surface(min_weight_);
       if (Submap* older = consistent_older(*submap)) {
         older->grid.merge(submap->grid);
         refresh(*older);
-        older->points_W = older->grid.surface(kMinWeight);
+        older->points_W = older->grid.surface(min_weight_);
         older->said.assign(older->points_W.size(), 0);
         submap->frames = 0;
       } else {
@@ -224,21 +219,21 @@ class SubmapMethod final : public MappingMethod {
   /// The inactive submap of the class that agrees with most of this one's surface.
   Submap* consistent_older(const Submap& submap) const {
     Submap* best = nullptr;
-    double best_share = kMatchShare;
+    double best_share = own_.match_share;
     for (const auto& other : submaps_) {
       if (other->active || other.get() == &submap || other->class_id != submap.class_id ||
-          other->frames < kConfirmFrames) {
+          other->frames < own_.confirm_frames) {
         continue;
       }
       std::size_t known = 0, near = 0;
       for (const Eigen::Vector3f& point : submap.points_W) {
         float distance = 1.0f;
-        if (!other->grid.distance_at(point, kMinWeight, distance)) continue;
+        if (!other->grid.distance_at(point, min_weight_, distance)) continue;
         ++known;
         near += std::abs(distance) < 0.5f;
       }
       const bool enough = static_cast<double>(known) >=
-                          kComparedShare * static_cast<double>(submap.points_W.size());
+                          own_.compared_share * static_cast<double>(submap.points_W.size());
       const double share =
           known > 0 && enough ? static_cast<double>(near) / static_cast<double>(known) : 0.0;
       if (share > best_share) best_share = share, best = other.get();
@@ -260,6 +255,8 @@ class SubmapMethod final : public MappingMethod {
   }
 
   PipelineConfig config_;
+  SubmapsConfig own_;
+  float min_weight_;
   Perception perception_;
   NaiveTsdf background_;
   std::vector<std::unique_ptr<Submap>> submaps_;
@@ -269,8 +266,9 @@ class SubmapMethod final : public MappingMethod {
 
 }  // namespace
 
-std::unique_ptr<MappingMethod> make_submap_method(const PipelineConfig& config) {
-  return std::make_unique<SubmapMethod>(config);
+std::unique_ptr<MappingMethod> make_submap_method(const PipelineConfig& config,
+                                                  const SubmapsConfig& own) {
+  return std::make_unique<SubmapMethod>(config, own);
 }
 
 }  // namespace pocd

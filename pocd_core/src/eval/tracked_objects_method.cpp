@@ -16,11 +16,6 @@
 namespace pocd {
 namespace {
 
-constexpr float kMaxWeight = 10000.0f, kMinWeight = 0.5f;  // as for the static map
-constexpr int kLostAfterFrames = 10;
-constexpr int kMinHits = 2;  // frames that must have seen a point of a model for it to be reported
-constexpr double kOverlap = 0.3;  // share of an observation that a model explains before alignment
-
 struct Track {
   ObjectId id = ObjectId::kNone;
   ClassId class_id = 0;
@@ -31,11 +26,11 @@ struct Track {
 
 class TrackedObjectsMethod final : public MappingMethod {
  public:
-  TrackedObjectsMethod(const PipelineConfig& config, bool keep_lost)
+  TrackedObjectsMethod(const PipelineConfig& config, const TrackedObjectsConfig& own)
       : config_(config),
-        keep_lost_(keep_lost),
+        own_(own),
         perception_(config),
-        background_(config.map, kMaxWeight) {}
+        background_(config.map, static_cast<float>(own.max_weight)) {}
 
   FrameResult process(const Frame& frame) override {
     const Observations& observations = perception_.observe(frame);
@@ -49,10 +44,10 @@ class TrackedObjectsMethod final : public MappingMethod {
   }
 
   Points surface() const override {
-    Points points = background_.surface(kMinWeight);
+    Points points = background_.surface(static_cast<float>(own_.min_weight));
     for (const Track& track : tracks_) {
       for (const Surfel& surfel : track.model.surfels()) {
-        if (surfel.hits >= kMinHits) points.push_back(surfel.point_W);
+        if (surfel.hits >= own_.min_hits) points.push_back(surfel.point_W);
       }
     }
     return points;
@@ -92,7 +87,7 @@ class TrackedObjectsMethod final : public MappingMethod {
             (tracks_[t].box.pose.position_W - observation.box.pose.position_W).norm() <
             config_.association.max_distance_m;
         if (share < 1.0 - config_.association.max_dissimilarity && near &&
-            tracks_[t].missed < kLostAfterFrames) {
+            tracks_[t].missed < own_.lost_after_frames) {
           const double aligned = align(tracks_[t], observation, T_new_old);
           if (aligned > share) {
             share = aligned;
@@ -100,7 +95,7 @@ class TrackedObjectsMethod final : public MappingMethod {
             T_new_old = Pose::Identity();
           }
         }
-        if (share > kOverlap)
+        if (share > own_.overlap_share)
           pairs.push_back({static_cast<int>(t), static_cast<int>(m), 1.0 - share});
       }
     }
@@ -122,10 +117,10 @@ class TrackedObjectsMethod final : public MappingMethod {
                          0});
       fuse(tracks_.back(), observations.list[movable[m]]);
     }
-    if (keep_lost_) return;
+    if (own_.keep_lost) return;
     tracks_.erase(
         std::remove_if(tracks_.begin(), tracks_.end(),
-                       [](const Track& track) { return track.missed > kLostAfterFrames; }),
+                       [&](const Track& track) { return track.missed > own_.lost_after_frames; }),
         tracks_.end());
   }
 
@@ -158,7 +153,7 @@ class TrackedObjectsMethod final : public MappingMethod {
   }
 
   PipelineConfig config_;
-  bool keep_lost_;
+  TrackedObjectsConfig own_;
   Perception perception_;
   NaiveTsdf background_;
   std::vector<Track> tracks_;
@@ -168,8 +163,8 @@ class TrackedObjectsMethod final : public MappingMethod {
 }  // namespace
 
 std::unique_ptr<MappingMethod> make_tracked_objects_method(const PipelineConfig& config,
-                                                           bool keep_lost) {
-  return std::make_unique<TrackedObjectsMethod>(config, keep_lost);
+                                                           const TrackedObjectsConfig& own) {
+  return std::make_unique<TrackedObjectsMethod>(config, own);
 }
 
 }  // namespace pocd

@@ -11,7 +11,8 @@ namespace {
 
 class VoxelCorrectionMethod final : public MappingMethod {
  public:
-  explicit VoxelCorrectionMethod(const TsdfConfig& config) : pool_(1), map_(config) {}
+  VoxelCorrectionMethod(const TsdfConfig& config, const VoxelCorrectionConfig& own)
+      : pool_(1), map_(with(config, own)) {}
 
   FrameResult process(const Frame& frame) override {
     IntegrationInput input;
@@ -22,14 +23,21 @@ class VoxelCorrectionMethod final : public MappingMethod {
   Points surface() const override { return surface_points(map_, map_.config().min_publish_weight); }
 
  private:
+  static TsdfConfig with(TsdfConfig config, const VoxelCorrectionConfig& own) {
+    config.max_weight = own.max_weight;
+    config.min_publish_weight = own.min_weight;
+    return config;
+  }
+
   ThreadPool pool_;
   TsdfMap map_;
 };
 
 }  // namespace
 
-std::unique_ptr<MappingMethod> make_voxel_correction_method(const PipelineConfig& config) {
-  return std::make_unique<VoxelCorrectionMethod>(config.map);
+std::unique_ptr<MappingMethod> make_voxel_correction_method(const PipelineConfig& config,
+                                                            const VoxelCorrectionConfig& own) {
+  return std::make_unique<VoxelCorrectionMethod>(config.map, own);
 }
 
 }  // namespace pocd

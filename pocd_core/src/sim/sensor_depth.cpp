@@ -166,7 +166,7 @@ void degrade_depth(const SensorModel& model, const NoiseKey& key, cv::Mat& depth
         const float sigma = base + quadratic * z[u] * z[u];
         z[u] += sigma * (own * normal_of(pixel.next()) + common * smooth[u]);
       }
-      if (quantum > 0.0f) z[u] = quantum * std::round(z[u] / quantum);
+      if (quantum > 0.0f) z[u] = quantum * std::floor(z[u] / quantum + 0.5f);
       if (z[u] < 0.0f) z[u] = 0.0f;
     }
   }

@@ -12,6 +12,9 @@ namespace {
 
 enum Channel : std::uint64_t { kBorder = 21, kBlob = 22, kAlias = 23, kPose = 24, kColor = 25 };
 
+/// std::lround without its call.
+int nearest(float x) { return static_cast<int>(x + std::copysign(0.5f, x)); }
+
 /// Looks every pixel up at a place displaced by a smooth field: borders become ragged, insides
 /// stay.
 void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labels) {
@@ -40,9 +43,9 @@ void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labe
       const cv::Vec2f shift =
           (1 - b) * ((1 - a) * low[0] + a * low[1]) + b * ((1 - a) * high[0] + a * high[1]);
       const int from_u =
-          std::clamp(u + static_cast<int>(std::lround(shift[0])), 0, labels.cols - 1);
+          std::clamp(u + nearest(shift[0]), 0, labels.cols - 1);
       const int from_v =
-          std::clamp(v + static_cast<int>(std::lround(shift[1])), 0, labels.rows - 1);
+          std::clamp(v + nearest(shift[1]), 0, labels.rows - 1);
       out[u] = clean.at<std::uint16_t>(from_v, from_u);
     }
   }

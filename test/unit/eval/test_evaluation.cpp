@@ -58,8 +58,13 @@ RunScore evaluate(const Scenario& scenario, const std::vector<MethodSpec>& metho
 std::vector<MethodSpec> all_methods(const PipelineConfig& config) {
   return {{"pocd", [=] { return make_pocd_method(config); }},
           {"static_tsdf", [=] { return make_static_tsdf_method(config); }},
-          {"tracked_objects", [=] { return make_tracked_objects_method(config, false); }},
-          {"tracked_objects_keep", [=] { return make_tracked_objects_method(config, true); }},
+          {"tracked_objects", [=] { return make_tracked_objects_method(config); }},
+          {"tracked_objects_keep",
+           [=] {
+             TrackedObjectsConfig keep;
+             keep.keep_lost = true;
+             return make_tracked_objects_method(config, keep);
+           }},
           {"voxel_correction", [=] { return make_voxel_correction_method(config); }},
           {"submaps", [=] { return make_submap_method(config); }}};
 }

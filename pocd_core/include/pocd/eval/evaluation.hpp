@@ -29,6 +29,8 @@ struct EvaluationInput {
   std::vector<std::uint64_t> visit_begin;
   std::shared_ptr<const SceneTruth> truth;  ///< null for recordings
   FaultOptions faults;
+  /// Map the last visit alone too and compare with it; a third of the cost of a two-visit run.
+  bool with_reference = true;
 };
 
 /// E[v] of an object after each frame in which it was in the library: (frame, E[v]).

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pocd/eval/baseline_config.hpp"
 #include "pocd/input/frame.hpp"
 #include "pocd/pipeline/frame_result.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
@@ -33,17 +34,19 @@ std::unique_ptr<MappingMethod> make_pocd_method(const PipelineConfig& config);
 
 /// Static world: every depth image is averaged into one TSDF, as Voxblox and Kimera do (Oleynikova
 /// et al., IROS 2017; Rosinol et al., ICRA 2020).
-std::unique_ptr<MappingMethod> make_static_tsdf_method(const PipelineConfig& config);
+std::unique_ptr<MappingMethod> make_static_tsdf_method(const PipelineConfig& config,
+                                                       const StaticTsdfConfig& own = {});
 
 /// Tracked dynamic objects, after MaskFusion (Runz, Buffier, Agapito, ISMAR 2018).
-/// keep_lost: an object that is lost stays where it was seen last, instead of being given up.
 std::unique_ptr<MappingMethod> make_tracked_objects_method(const PipelineConfig& config,
-                                                           bool keep_lost);
+                                                           const TrackedObjectsConfig& own = {});
 
 /// Voxel-level correction by new observations, after Fehr et al. (ICRA 2017).
-std::unique_ptr<MappingMethod> make_voxel_correction_method(const PipelineConfig& config);
+std::unique_ptr<MappingMethod> make_voxel_correction_method(
+    const PipelineConfig& config, const VoxelCorrectionConfig& own = {});
 
 /// Object submaps with consistency checks, after Panoptic Multi-TSDFs (Schmid et al., ICRA 2022).
-std::unique_ptr<MappingMethod> make_submap_method(const PipelineConfig& config);
+std::unique_ptr<MappingMethod> make_submap_method(const PipelineConfig& config,
+                                                  const SubmapsConfig& own = {});
 
 }  // namespace pocd

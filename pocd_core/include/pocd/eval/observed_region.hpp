@@ -19,8 +19,8 @@ class ObservedRegion {
 
   /// A voxel counts as seen when its centre is in view and the pixel's depth is within the margin,
   /// as seen through when the depth is farther by more. A return beyond the depth limit shows free
-  /// space up to the limit; no return shows nothing.
-  void add(const Frame& frame);
+  /// space up to the limit; no return shows nothing. Counts as `frames` frames.
+  void add(const Frame& frame, int frames = 1);
 
   struct Voxel {
     std::uint16_t seen = 0;          ///< frames

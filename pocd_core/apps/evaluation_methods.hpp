@@ -1,0 +1,56 @@
+// Methods by name, and variants of them as lists in YAML.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pocd/config/describe.hpp"
+#include "pocd/eval/evaluation.hpp"
+
+namespace pocd {
+
+/// pocd, static_tsdf, tracked_objects, tracked_objects_keep, submaps, voxel_correction.
+const std::vector<std::string>& method_names();
+
+/// A method with other parameters.
+struct Variant {
+  std::string name;
+  std::string method = "pocd";
+  std::vector<std::string> config;
+  std::vector<std::string> set;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("name", name, "Name in the tables.");
+    visit("method", method, Choices{method_names()}, "Method that it is a variant of.");
+    visit("config", config, "Configuration files over those of the command line, beside this one.");
+    visit("set", set, "Parameters: GROUP.KEY=VALUE; a baseline's group is its name.");
+  }
+};
+
+struct VariantList {
+  std::vector<Variant> variants;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("variants", variants, "Variants in the order of the table.");
+  }
+};
+
+/// The configuration that variants start from.
+struct BaseConfig {
+  std::vector<std::filesystem::path> files;
+  std::vector<std::string> overrides;
+};
+
+/// Throws InputError for wrong parameters.
+MethodSpec make_method(const Variant& variant, const BaseConfig& base);
+
+/// Variants of a file; names in `config` are made relative to it. Throws InputError.
+std::vector<Variant> load_variants(const std::filesystem::path& file);
+
+/// NAME=FILE or NAME=GROUP.KEY=VALUE[,GROUP.KEY=VALUE].
+Variant parse_variant(const std::string& text);
+
+}  // namespace pocd

@@ -1,0 +1,107 @@
+// Thresholds of the methods that the pipeline is compared with. Their defaults are what `pocd_tune`
+// found on scenes and seeds other than those that are reported; docs/evaluation.md has the command.
+#pragma once
+
+#include "pocd/config/describe.hpp"
+
+namespace pocd {
+
+struct StaticTsdfConfig {
+  double max_weight = 10000.0;
+  double min_weight = 0.5;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("max_weight", max_weight, Range{0.1, 1e6},
+          "Cap of a voxel's weight [observations at 1 m]; 10000, in effect none, is Voxblox's.");
+    visit("min_weight", min_weight, Range{0.0, 1e6},
+          "Weight at which a voxel counts as observed [observations at 1 m].");
+  }
+};
+
+struct VoxelCorrectionConfig {
+  int max_weight = 100;
+  int min_weight = 2;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("max_weight", max_weight, Range{1, 1000}, "Cap of a voxel's weight [observations].");
+    visit("min_weight", min_weight, Range{1, 1000},
+          "Weight at which a voxel counts as observed [observations].");
+  }
+};
+
+struct TrackedObjectsConfig {
+  double max_weight = 10000.0;
+  double min_weight = 0.5;
+  int lost_after_frames = 10;
+  bool keep_lost = false;
+  int min_hits = 2;
+  double overlap_share = 0.3;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("max_weight", max_weight, Range{0.1, 1e6},
+          "Cap of a voxel's weight in the static map [observations at 1 m].");
+    visit("min_weight", min_weight, Range{0.0, 1e6},
+          "Weight at which a voxel of the static map counts as observed [observations at 1 m].");
+    visit("lost_after_frames", lost_after_frames, Range{1, 1000000},
+          "A model that is not found for this many frames is lost [frames]; MaskFusion: 10.");
+    visit("keep_lost", keep_lost, "A lost model stays where it was seen last, not given up.");
+    visit("min_hits", min_hits, Range{1, 1000},
+          "Frames that must have seen a point of a model for it to be reported.");
+    visit("overlap_share", overlap_share, Range{0.0, 1.0},
+          "Share of an observation that a model must explain to be tracked on it.");
+  }
+};
+
+struct SubmapsConfig {
+  double max_weight = 10000.0;
+  double min_weight = 0.5;
+  int inactive_after_frames = 15;
+  int confirm_frames = 3;
+  double same_thing_share = 0.3;
+  double conflict_share = 0.3;
+  double match_share = 0.5;
+  double compared_share = 0.2;
+  double margin_voxels = 2.0;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("max_weight", max_weight, Range{0.1, 1e6},
+          "Cap of a voxel's weight [observations at 1 m].");
+    visit("min_weight", min_weight, Range{0.0, 1e6},
+          "Weight at which a voxel counts as observed [observations at 1 m].");
+    visit("inactive_after_frames", inactive_after_frames, Range{1, 1000000},
+          "A submap that is not observed for this many frames is frozen [frames].");
+    visit("confirm_frames", confirm_frames, Range{1, 1000},
+          "Frames that must have observed a submap for it to be kept.");
+    visit("same_thing_share", same_thing_share, Range{0.0, 1.0},
+          "Share of an observation that an active submap must explain to take it.");
+    visit("conflict_share", conflict_share, Range{0.0, 1.0},
+          "A frozen submap is discarded when more of its compared points are seen through.");
+    visit("match_share", match_share, Range{0.0, 1.0},
+          "A new submap is merged into a frozen one that agrees with more of it.");
+    visit("compared_share", compared_share, Range{0.0, 1.0},
+          "Share of a submap's points to be compared before anything is decided.");
+    visit("margin_voxels", margin_voxels, Range{0.1, 20.0},
+          "Depth beyond a point by more than this conflicts, within it matches [voxels].");
+  }
+};
+
+struct BaselineConfig {
+  StaticTsdfConfig static_tsdf;
+  VoxelCorrectionConfig voxel_correction;
+  TrackedObjectsConfig tracked_objects;
+  SubmapsConfig submaps;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit.group("static_tsdf", static_tsdf, "Static world.");
+    visit.group("voxel_correction", voxel_correction, "Correction voxel by voxel.");
+    visit.group("tracked_objects", tracked_objects, "Tracked dynamic objects.");
+    visit.group("submaps", submaps, "Object submaps with consistency checks.");
+  }
+};
+
+}  // namespace pocd
