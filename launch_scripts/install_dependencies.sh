@@ -14,6 +14,7 @@ packages=(
   libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev iproute2 iptables
+  cyclonedds-dev cyclonedds-tools tshark
 )
 
 if [[ "${1:-}" == "--list" ]]; then

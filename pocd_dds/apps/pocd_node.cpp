@@ -67,6 +67,9 @@ int main(int argc, char** argv) {
   app.add_flag_callback(
       "--lossless", [&] { overrides.push_back("node.lossless=true"); },
       "Hold the player back instead of dropping frames (replays)");
+  app.add_option("--name", options.bus.name, "Name of this node in health and diagnostics")
+      ->envname("POCD_NAME")
+      ->capture_default_str();
   app.add_option("--epoch", epoch, "Name of this run; default: random. Never use one twice")
       ->check(CLI::Range(std::uint64_t{1}, ~std::uint64_t{0}));
   app.add_flag("--dump", dump, "Print the effective configuration and end");

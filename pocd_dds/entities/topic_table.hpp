@@ -51,7 +51,7 @@ inline constexpr TopicSpec kTf{"rt/tf", "tf2_msgs::msg::dds_::TFMessage_", Direc
                                best_effort(100)};
 inline constexpr TopicSpec kTfStatic{"rt/tf_static", "tf2_msgs::msg::dds_::TFMessage_",
                                      Direction::kIn, false, latched(100)};
-inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kOut,
+inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kBoth,
                                   false, reliable(1)};
 
 inline constexpr TopicSpec kObjects{"pocd/objects", "pocd_msgs::msg::dds_::ObjectState_",
@@ -94,6 +94,14 @@ inline constexpr TopicSpec kMarkers{"rt/pocd/objects/markers",
                                     false, latched(1)};
 inline constexpr TopicSpec kOccupancy{"rt/pocd/map", "nav_msgs::msg::dds_::OccupancyGrid_",
                                       Direction::kOut, false, latched(1)};
+inline constexpr TopicSpec kOccupancyUpdates{"rt/pocd/map_updates",
+                                             "map_msgs::msg::dds_::OccupancyGridUpdate_",
+                                             Direction::kOut, false, reliable(10)};
+inline constexpr TopicSpec kSurface{"rt/pocd/surface", "sensor_msgs::msg::dds_::PointCloud2_",
+                                    Direction::kOut, false, latched(1)};
+inline constexpr TopicSpec kRmfObstacles{"rt/rmf_obstacles",
+                                         "rmf_obstacle_msgs::msg::dds_::Obstacles_",
+                                         Direction::kOut, false, best_effort(10)};
 
 }  // namespace topics
 

@@ -17,11 +17,12 @@ struct RawWriter::Impl : DataWriterListener {
   std::shared_ptr<Participant> participant;
   DataWriter* writer = nullptr;
   std::string topic;
-  std::atomic<int> matched{0};
+  std::atomic<int> matched{0}, ever_matched{0};
   std::atomic<std::uint64_t> incompatible{0};
 
   void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override {
     matched = status.current_count;
+    ever_matched = status.total_count;
   }
   void on_offered_incompatible_qos(DataWriter*,
                                    const OfferedIncompatibleQosStatus& status) override {
@@ -50,6 +51,7 @@ RawWriter::~RawWriter() {
 }
 
 int RawWriter::matched() const { return impl_->matched; }
+int RawWriter::ever_matched() const { return impl_->ever_matched; }
 std::uint64_t RawWriter::incompatible() const { return impl_->incompatible; }
 
 bool RawWriter::wait_acknowledged(std::chrono::milliseconds time) {

@@ -24,6 +24,8 @@ class RawWriter {
   const std::string& topic() const { return topic_; }
   /// Readers matched now.
   int matched() const;
+  /// Readers matched ever: grows with every new one.
+  int ever_matched() const;
   /// Writes that Fast DDS refused, and readers whose quality of service does not fit.
   std::uint64_t failures() const { return failures_; }
   std::uint64_t incompatible() const;

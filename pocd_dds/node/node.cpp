@@ -12,7 +12,7 @@
 #include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 #include "pocd_dds/node/object_publication.hpp"
-#include "pocd_dds/node/visual_publication.hpp"
+#include "pocd_dds/node/ros_outputs.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -31,11 +31,12 @@ struct Node::Impl {
         participant(std::make_shared<Participant>(options.bus)),
         pipeline(config.pipeline),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
+        outputs(participant, config, options.epoch),
+        clock(participant, config.node.use_clock, wakeup),
         frames(participant, options.epoch),
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
-        visuals(participant, config),
-        status(participant, options.bus.name, options.epoch),
+        status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
         intake(participant, config.node, config.pipeline.classes, queue),
         worker([this] { work(); }) {}
 
@@ -48,6 +49,7 @@ struct Node::Impl {
   void process(const Frame& frame);
   void publish(bool now);
   void send_status(const std::string& state);
+  void send_outputs(bool last);
   bool finish();
 
   const NodeFile config;
@@ -56,12 +58,15 @@ struct Node::Impl {
   FrameQueue queue;
   Wakeup wakeup;
 
+  // run()'s thread only.
+  RosOutputs outputs;
+  NodeClock clock;
+
   // Guards everything below that the worker and run() both use.
   mutable std::mutex mutex;
   FrameLog frames;
   ObjectPublication objects;
   MapPublication map;
-  VisualPublication visuals;
   StatusPublication status;
   WorkStatus counts;
   double busy_ms = 0.0;
@@ -132,7 +137,16 @@ void Node::Impl::send_status(const std::string& state) {
   counts.map_version = map.publisher().version();
   counts.objects = objects.objects().size();
   map.send_manifest(counts.objects, state == "stopped");
-  status.send(input, counts, queue.size(), queue.dropped(), state);
+  status.send(input, counts, queue.size(), queue.dropped(), state, clock.now_ns());
+}
+
+void Node::Impl::send_outputs(bool last) {
+  const StampNs now_ns = clock.now_ns();
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    outputs.collect(objects.objects(), map.publisher().tiles(), counts.stamp_ns, now_ns, last);
+  }
+  outputs.send();
 }
 
 bool Node::Impl::finish() {
@@ -140,15 +154,15 @@ bool Node::Impl::finish() {
   worker.join();
   if (failure) std::rethrow_exception(failure);
   send_status("stopped");
+  send_outputs(true);
   const std::lock_guard<std::mutex> lock(mutex);
-  visuals.send_markers(objects.objects(), counts.stamp_ns);
-  visuals.send_occupancy(map.publisher().tiles(), counts.stamp_ns);
   const auto wait =
       std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
   // A late subscriber that asked for a snapshot just now still gets it.
   map.answer_requests();
   const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait) &&
-                            frames.wait_acknowledged(wait) && status.wait_acknowledged(wait);
+                            frames.wait_acknowledged(wait) && status.wait_acknowledged(wait) &&
+                            outputs.wait_acknowledged(wait);
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
   return acknowledged && counts.write_failures == 0;
 }
@@ -162,7 +176,7 @@ Node::~Node() = default;
 
 bool Node::run(const std::atomic<bool>& stop) {
   Impl& node = *impl_;
-  Clock::time_point status_sent{}, visuals_sent{};
+  Clock::time_point status_sent{};
   while (!stop && !node.failed) {
     node.wakeup.wait_for(kPoll);
     {
@@ -174,12 +188,7 @@ bool Node::run(const std::atomic<bool>& stop) {
       status_sent = now;
       node.send_status("running");
     }
-    if (seconds(now - visuals_sent) >= node.config.node.visual_period_s) {
-      visuals_sent = now;
-      const std::lock_guard<std::mutex> lock(node.mutex);
-      node.visuals.send_markers(node.objects.objects(), node.counts.stamp_ns);
-      node.visuals.send_occupancy(node.map.publisher().tiles(), node.counts.stamp_ns);
-    }
+    node.send_outputs(false);
   }
   return node.finish();
 }

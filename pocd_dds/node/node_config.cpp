@@ -11,6 +11,18 @@ std::vector<std::string> MountConfig::inconsistencies() const {
   return {"qx, qy, qz, qw: the quaternion has length " + std::to_string(length) + ", expected 1"};
 }
 
+std::vector<std::string> RosOutputConfig::inconsistencies() const {
+  std::vector<std::string> problems;
+  if (!(occupancy_low_m < occupancy_high_m)) {
+    problems.push_back("occupancy_low_m must be below occupancy_high_m");
+  }
+  // One lost sample must not let all obstacles lapse: they are best effort.
+  if (obstacles_hz > 0.0 && obstacle_lifetime_s * obstacles_hz < 2.0) {
+    problems.push_back("obstacle_lifetime_s is shorter than two periods of obstacles_hz");
+  }
+  return problems;
+}
+
 std::vector<std::string> NodeConfig::inconsistencies() const {
   std::vector<std::string> problems;
   std::set<std::string> names;
@@ -27,9 +39,6 @@ std::vector<std::string> NodeConfig::inconsistencies() const {
         problems.push_back("topics: \"" + *pattern + "\" lacks {robot}, and there are several");
       }
     }
-  }
-  if (!(occupancy_low_m < occupancy_high_m)) {
-    problems.push_back("occupancy_low_m must be below occupancy_high_m");
   }
   return problems;
 }

@@ -72,6 +72,41 @@ struct TopicPatterns {
   }
 };
 
+/// Rates of the topics for others; 0 switches one off.
+struct RosOutputConfig {
+  double markers_hz = 1.0;
+  double occupancy_hz = 1.0;
+  double surface_hz = 0.5;
+  double obstacles_hz = 1.0;
+  double diagnostics_hz = 1.0;
+  double occupancy_low_m = 0.1;
+  double occupancy_high_m = 2.0;
+  int surface_points = 2'000'000;
+  double obstacle_lifetime_s = 3.0;
+  std::string level_name = "L1";
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("markers_hz", markers_hz, Range{0.0, 20.0}, "rt/pocd/objects/markers; 0: off [1/s].");
+    visit("occupancy_hz", occupancy_hz, Range{0.0, 20.0},
+          "rt/pocd/map and rt/pocd/map_updates, when the map has changed; 0: off [1/s].");
+    visit("surface_hz", surface_hz, Range{0.0, 20.0},
+          "rt/pocd/surface, while it has subscribers and when the map has changed; 0: off [1/s].");
+    visit("obstacles_hz", obstacles_hz, Range{0.0, 20.0}, "rt/rmf_obstacles; 0: off [1/s].");
+    visit("diagnostics_hz", diagnostics_hz, Range{0.0, 1.0}, "rt/diagnostics; 0: off [1/s].");
+    visit("occupancy_low_m", occupancy_low_m, Range{-100, 100},
+          "Lower end of the heights where a surface makes a cell of the grid occupied [m].");
+    visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
+          "Upper end of these heights [m].");
+    visit("surface_points", surface_points, Range{1000, 50'000'000},
+          "Most points of rt/pocd/surface; a larger surface is thinned.");
+    visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
+          "How long an obstacle that is not sent again stays with the fleet manager [s].");
+    visit("level_name", level_name, "Level of the building that the obstacles are on (Open-RMF).");
+  }
+  std::vector<std::string> inconsistencies() const;
+};
+
 struct NodeConfig {
   std::vector<RobotConfig> robots;
   TopicPatterns topics;
@@ -87,11 +122,8 @@ struct NodeConfig {
   bool lossless = false;
   double object_period_s = 0.1;
   double map_period_s = 0.5;
-  double visual_period_s = 1.0;
-  bool publish_markers = true;
-  bool publish_occupancy = true;
-  double occupancy_low_m = 0.1;
-  double occupancy_high_m = 2.0;
+  bool use_clock = false;
+  RosOutputConfig outputs;
   double shutdown_wait_s = 10.0;
 
   template <class Visitor>
@@ -119,14 +151,10 @@ struct NodeConfig {
     visit("object_period_s", object_period_s, Range{0.0, 60.0},
           "Least time between two samples of one object [s].");
     visit("map_period_s", map_period_s, Range{0.0, 60.0}, "Least time between two map deltas [s].");
-    visit("visual_period_s", visual_period_s, Range{0.1, 60.0},
-          "Time between two samples of the marker and grid topics [s].");
-    visit("publish_markers", publish_markers, "Publish rt/pocd/objects/markers.");
-    visit("publish_occupancy", publish_occupancy, "Publish rt/pocd/map.");
-    visit("occupancy_low_m", occupancy_low_m, Range{-100, 100},
-          "Lower end of the heights that the grid shows [m].");
-    visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
-          "Upper end of the heights that the grid shows [m].");
+    visit("use_clock", use_clock,
+          "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
+          "use_sim_time).");
+    visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
     visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
           "How long to wait at the end for subscribers to acknowledge [s].");
   }

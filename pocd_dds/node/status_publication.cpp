@@ -42,14 +42,17 @@ std::array<std::uint8_t, 16> node_key(std::uint64_t epoch) {
 }  // namespace
 
 StatusPublication::StatusPublication(const std::shared_ptr<Participant>& participant,
-                                     std::string name, std::uint64_t epoch)
-    : name_(std::move(name)),
-      epoch_(epoch),
-      health_(participant, topics::kHealth),
-      diagnostics_(participant, topics::kDiagnostics) {}
+                                     std::string name, std::uint64_t epoch, double diagnostics_hz)
+    : name_(std::move(name)), epoch_(epoch), health_(participant, topics::kHealth) {
+  if (diagnostics_hz <= 0.0) return;
+  diagnostics_period_s_ = 1.0 / diagnostics_hz;
+  diagnostics_ = std::make_unique<Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType>>(
+      participant, topics::kDiagnostics);
+}
 
 void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
-                             std::uint64_t queue_dropped, const std::string& state) {
+                             std::uint64_t queue_dropped, const std::string& state,
+                             StampNs now_ns) {
   pocd_msgs::msg::NodeHealth health;
   health.node(node_key(epoch_));
   health.stamp(to_time(wall_clock_ns()));
@@ -67,7 +70,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   health.map_version(work.map_version);
 
   diagnostic_msgs::msg::DiagnosticArray diagnostics;
-  diagnostics.header().stamp(health.stamp());
+  diagnostics.header().stamp(to_time(now_ns));
   auto node = status_of(health.level(), name_, health.message());
   std::uint64_t received = 0, dropped = queue_dropped;
   for (const RobotStatus& robot : intake.robots) {
@@ -111,7 +114,13 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   if (!work.last_warning.empty()) add(node, "last warning", work.last_warning);
   diagnostics.status().insert(diagnostics.status().begin(), node);
   health_.write(health);
-  diagnostics_.write(diagnostics);
+  if (!diagnostics_) return;
+  // Health keeps its own rhythm of about a second, so the first one that is not much too early.
+  const auto now = std::chrono::steady_clock::now();
+  const double since_s = std::chrono::duration<double>(now - diagnostics_sent_).count();
+  if (since_s < diagnostics_period_s_ - 0.5 && state == "running") return;
+  diagnostics_sent_ = now;
+  diagnostics_->write(diagnostics);
 }
 
 }  // namespace pocd::dds

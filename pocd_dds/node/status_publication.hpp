@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -25,11 +26,13 @@ struct WorkStatus {
 /// Not thread-safe.
 class StatusPublication {
  public:
+  /// Diagnostics at most at `diagnostics_hz`, 0: none.
   StatusPublication(const std::shared_ptr<Participant>& participant, std::string name,
-                    std::uint64_t epoch);
+                    std::uint64_t epoch, double diagnostics_hz);
 
+  /// Health is stamped by the wall clock, diagnostics with `now_ns`, the time of their readers.
   void send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
-            std::uint64_t queue_dropped, const std::string& state);
+            std::uint64_t queue_dropped, const std::string& state, StampNs now_ns);
   /// Health only: it says how the node ended.
   bool wait_acknowledged(std::chrono::milliseconds time) { return health_.wait_acknowledged(time); }
 
@@ -37,7 +40,9 @@ class StatusPublication {
   std::string name_;
   std::uint64_t epoch_;
   Writer<pocd_msgs::msg::NodeHealthPubSubType> health_;
-  Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType> diagnostics_;
+  std::unique_ptr<Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType>> diagnostics_;
+  double diagnostics_period_s_ = 0.0;
+  std::chrono::steady_clock::time_point diagnostics_sent_{};
 };
 
 }  // namespace pocd::dds

@@ -55,12 +55,32 @@ TEST(Node, UsageErrorsAreOneLineAndExitCode2) {
 }
 
 TEST(Commands, HelpShowsAnExample) {
-  for (const char* command : {"pocd_node", "pocd_play", "pocd_mirror"}) {
+  for (const char* command : {"pocd_node", "pocd_play", "pocd_mirror", "pocd_health"}) {
     const CommandResult result = run_command({bin(command), "--help"});
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_NE(result.out.find("Example"), std::string::npos) << command;
     EXPECT_NE(result.out.find(std::string(command) + " --"), std::string::npos) << command;
   }
+}
+
+TEST(Health, FreshNodeIsUpAndSaysWhatItWaitsFor) {
+  const TestDomain domain;
+  const auto ask = [&](const std::string& name, const std::string& timeout) {
+    return run_command(
+        {bin("pocd_health"), "--domain", domain.text(), "--name", name, "--timeout", timeout});
+  };
+  Process node(node_command(domain, {"--name", "north_hall"}));
+  const CommandResult up = ask("north_hall", "60");
+  EXPECT_EQ(up.exit_code, 0) << up.out;
+  EXPECT_EQ(up.out,
+            "north_hall is up: running, robot1: waiting for its first frame, 0 frames processed, 0 "
+            "objects, map version 0\n");
+  const CommandResult other = ask("south_hall", "0.5");
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_NE(other.out.find("south_hall was not heard on domain"), std::string::npos) << other.out;
+  node.signal(SIGINT);
+  EXPECT_EQ(node.wait().exit_code, 0);
+  EXPECT_EQ(ask("north_hall", "0.5").exit_code, 1);
 }
 
 /// A sender of one robot's messages that does not care whether they are good.

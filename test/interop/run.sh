@@ -1,22 +1,27 @@
 #!/usr/bin/env bash
-# Records a short simulated run with all of the component's topics, and has other people's readers
-# decode it. usage: run.sh BIN_DIR WORK_DIR. Exit code 77: skipped, there is no npm or no network.
+# Compares the bytes of every ROS 2 type with those of another serialiser; then records a short simulated
+# run with all of the component's topics, and has other people's readers decode it.
+# usage: run.sh BIN_DIR WORK_DIR WRITE_MESSAGES. Exit code 77: skipped, there is no npm or no network.
 set -euo pipefail
 
-bin=$1 work=$2
+bin=$1 work=$2 write_messages=$3
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 if ! command -v npm >/dev/null || ! command -v node >/dev/null; then
   echo "interop: skipped, npm and node are not installed"
   exit 77
 fi
 mkdir -p "$work"
-cp "$here/package.json" "$here/check.js" "$work"
+cp "$here/package.json" "$here"/*.js "$work"
 cd "$work"
 if ! npm install --no-audit --no-fund --loglevel=error >npm.log 2>&1; then
   echo "interop: skipped, npm cannot fetch its packages:"
   tail -n 3 npm.log
   exit 77
 fi
+
+rm -rf messages && mkdir messages
+"$write_messages" messages
+node check_cdr.js messages
 
 export ROS_DOMAIN_ID=${POCD_INTEROP_DOMAIN:-87} SKIP_DEFAULT_XML=1
 pids=()
@@ -37,7 +42,7 @@ recorder=$!
 pids+=("$recorder")
 wait_for "recording on domain" record.log
 "$bin/pocd_node" --config "$here/../../config/simulated.yaml" --robot robot1 --robot robot2 \
-  --set node.visual_period_s=0.2 >node.log 2>&1 &
+  --set node.outputs.markers_hz=5 >node.log 2>&1 &
 node_pid=$!
 pids+=("$node_pid")
 wait_for "recording /pocd/objects/markers" record.log

@@ -69,9 +69,16 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  /// What it has said on stderr so far.
+  /// What it has said so far.
+  std::string out() const { return read_text(folder_.path() / "out"); }
   std::string err() const { return read_text(folder_.path() / "err"); }
   void signal(int number) { ::kill(pid_, number); }
+  /// False when it has ended; wait() then returns at once.
+  bool running() const {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == 0;
+  }
 
   CommandResult wait() {
     int status = 0;

@@ -1,0 +1,77 @@
+// The published map seen from above, as nav_msgs/OccupancyGrid and map_msgs/OccupancyGridUpdate
+// have it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "pocd/map/map_delta.hpp"
+
+namespace pocd::dds {
+
+/// Values of a cell.
+constexpr std::int8_t kCellUnknown = -1, kCellFree = 0, kCellOccupied = 100;
+
+struct OccupancyOptions {
+  double voxel_size_m = 0.05;
+  double truncation_m = 0.2;
+  double low_m = 0.1;   ///< heights from here
+  double high_m = 2.0;  ///< to here decide whether a cell is occupied
+};
+
+/// Cells [x, x + width) x [y, y + height), row-major, x fastest.
+struct CellRectangle {
+  std::int32_t x = 0, y = 0;
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::int8_t> cells;
+};
+
+/// One cell per voxel column. Occupied: a surface within the band. Free: within the band free space
+/// was seen, or a floor not far below it, and no surface. Unknown: the rest. The grid grows with
+/// the map and never shrinks, so a cell keeps its place for as long as the size stays. Not
+/// thread-safe.
+class OccupancyProjection {
+ public:
+  /// A grid of more cells is no picture any more, and a mistaken far tile must not eat all memory.
+  static constexpr std::int64_t kMostCells = 64'000'000;
+
+  explicit OccupancyProjection(const OccupancyOptions& options) : options_(options) {}
+
+  /// Takes over a step of the map. Throws InputError for a payload that is no tile.
+  void apply(const std::vector<MapTile>& changed, const std::vector<TileKey>& removed);
+
+  /// Brings the grid up to date. True: its size or place is another than before, and a rectangle of
+  /// before means nothing any more; changed_rectangle() is empty then.
+  bool update();
+  /// The smallest rectangle around all cells that the last update() changed.
+  const std::optional<CellRectangle>& changed_rectangle() const { return changed_rectangle_; }
+
+  /// The whole grid; x and y count from the map frame's origin in cells. Empty without a map, or
+  /// when it would be too large.
+  const CellRectangle& grid() const { return grid_; }
+  bool too_large() const { return too_large_; }
+
+ private:
+  using Tower = std::pair<std::int32_t, std::int32_t>;  // x, y of the tiles above one another
+  using Cells = std::array<std::int8_t, kTileSide * kTileSide>;
+
+  Cells project(const MapTile& tile) const;
+  Cells top_view(const Tower& tower) const;
+  bool grow();
+  void paste(const Tower& tower, const Cells& cells);
+
+  const OccupancyOptions options_;
+  std::map<Tower, std::map<std::int32_t, Cells>> towers_;  // by z
+  std::set<Tower> dirty_;
+  Tower low_{0, 0}, high_{-1, -1};  // of all towers ever; none at first
+  CellRectangle grid_;
+  std::optional<CellRectangle> changed_rectangle_;
+  bool too_large_ = false;
+};
+
+}  // namespace pocd::dds

@@ -1,0 +1,166 @@
+#include "pocd_dds/node/ros_outputs.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+
+#include "pocd/map/birdseye.hpp"
+
+namespace pocd::dds {
+namespace {
+
+std::string source_of(std::uint64_t epoch) {
+  char text[32];
+  std::snprintf(text, sizeof text, "pocd-%016llx", static_cast<unsigned long long>(epoch));
+  return text;
+}
+
+OccupancyOptions occupancy_options(const NodeFile& config) {
+  return {config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m(),
+          config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m};
+}
+
+/// The keys of a list of steps, changed ones and removed ones.
+struct Keys {
+  std::vector<TileKey> changed, removed;
+};
+Keys split(std::map<TileKey, bool>& steps) {
+  Keys keys;
+  for (const auto& [key, changed] : steps) (changed ? keys.changed : keys.removed).push_back(key);
+  steps.clear();
+  return keys;
+}
+
+}  // namespace
+
+RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const NodeFile& config,
+                       std::uint64_t epoch)
+    : config_(config),
+      rates_(config_.node.outputs),
+      obstacle_options_{source_of(epoch), rates_.level_name, rates_.obstacle_lifetime_s},
+      markers_pace_(rates_.markers_hz),
+      occupancy_pace_(rates_.occupancy_hz),
+      surface_pace_(rates_.surface_hz),
+      obstacles_pace_(rates_.obstacles_hz),
+      projection_(occupancy_options(config)),
+      points_(config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m()) {
+  const auto make = [&](auto& writer, const Pace& pace, const TopicSpec& spec) {
+    using AnyWriter = typename std::decay_t<decltype(writer)>::element_type;
+    if (!pace.off()) writer = std::make_unique<AnyWriter>(participant, spec);
+  };
+  make(markers_, markers_pace_, topics::kMarkers);
+  make(grid_, occupancy_pace_, topics::kOccupancy);
+  make(grid_updates_, occupancy_pace_, topics::kOccupancyUpdates);
+  make(surface_, surface_pace_, topics::kSurface);
+  make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
+}
+
+void RosOutputs::copy_tiles(const std::map<TileKey, MapTile>& tiles) {
+  const auto note = [&](const TileKey& key, bool changed) {
+    if (grid_) grid_steps_[key] = changed;
+    if (surface_) surface_steps_[key] = changed;
+  };
+  for (auto copy = tiles_.begin(); copy != tiles_.end();) {
+    if (tiles.count(copy->first) > 0) {
+      ++copy;
+    } else {
+      note(copy->first, false);
+      copy = tiles_.erase(copy);
+    }
+  }
+  for (const auto& [key, tile] : tiles) {
+    const auto copy = tiles_.find(key);
+    if (copy != tiles_.end() && copy->second.version == tile.version) continue;
+    tiles_[key] = tile;
+    note(key, true);
+  }
+}
+
+void RosOutputs::collect(const ObjectsById& objects, const std::map<TileKey, MapTile>& tiles,
+                         StampNs stamp_ns, StampNs now_ns, bool last) {
+  // A topic without any reader is not worked for; who comes later gets it at the next period.
+  markers_due_ = markers_ && (markers_pace_.due(now_ns) || last);
+  occupancy_due_ = grid_ && (occupancy_pace_.due(now_ns) || last);
+  surface_due_ = surface_ && surface_->matched() > 0 && (surface_pace_.due(now_ns) || last);
+  obstacles_due_ = obstacles_ && obstacles_pace_.due(now_ns) && !last;
+  stamp_ns_ = stamp_ns;
+  now_ns_ = now_ns;
+  last_ = last;
+  if (markers_due_ || obstacles_due_ || surface_due_) objects_ = objects;
+  if (occupancy_due_ || surface_due_) copy_tiles(tiles);
+}
+
+void RosOutputs::send() {
+  if (markers_due_) send_markers();
+  if (obstacles_due_) send_obstacles();
+  if (occupancy_due_) send_occupancy();
+  if (surface_due_) send_surface();
+  markers_due_ = obstacles_due_ = occupancy_due_ = surface_due_ = false;
+}
+
+bool RosOutputs::wait_acknowledged(std::chrono::milliseconds time) {
+  const auto acknowledged = [time](const auto& writer) {
+    return !writer || writer->wait_acknowledged(time);
+  };
+  return acknowledged(markers_) && acknowledged(grid_) && acknowledged(grid_updates_) &&
+         acknowledged(surface_);
+}
+
+void RosOutputs::send_markers() {
+  auto message = marker_array(objects_, marker_departures_.update(objects_), first_markers_,
+                              stamp_ns_, config_.node.map_frame);
+  first_markers_ = false;
+  markers_->write(message);
+}
+
+void RosOutputs::send_obstacles() {
+  auto message =
+      obstacles_message(objects_, obstacle_departures_.update(objects_), config_.pipeline.classes,
+                        obstacle_options_, now_ns_, config_.node.map_frame);
+  if (!message.obstacles().empty()) obstacles_->write(message);
+}
+
+void RosOutputs::send_occupancy() {
+  const Keys keys = split(grid_steps_);
+  std::vector<MapTile> changed;
+  for (const TileKey& key : keys.changed) changed.push_back(tiles_.at(key));
+  projection_.apply(changed, keys.removed);
+  const bool was_too_large = projection_.too_large();
+  const bool resized = projection_.update();
+  if (projection_.too_large()) {
+    if (!was_too_large) {
+      spdlog::warn("{}: a grid of more than {} cells is not published", grid_->topic(),
+                   OccupancyProjection::kMostCells);
+    }
+    return;
+  }
+  // Who joins has the last whole grid, but not the updates since then: a new reader of either topic
+  // makes it whole again, and so does the end.
+  const int readers = grid_->ever_matched() + grid_updates_->ever_matched();
+  const auto& rectangle = projection_.changed_rectangle();
+  if (rectangle) grid_outdated_ = true;
+  if (resized || (grid_outdated_ && (readers != grid_readers_ || last_))) {
+    auto message = grid_message(projection_.grid(), config_.pipeline.map.voxel_size_m, stamp_ns_,
+                                config_.node.map_frame);
+    grid_->write(message);
+    grid_outdated_ = false;
+  } else if (rectangle) {
+    auto message = grid_update_message(*rectangle, stamp_ns_, config_.node.map_frame);
+    grid_updates_->write(message);
+  }
+  grid_readers_ = readers;
+}
+
+void RosOutputs::send_surface() {
+  const Keys keys = split(surface_steps_);
+  if (keys.changed.empty() && keys.removed.empty() && !surface_unsent_) return;
+  points_.apply(tiles_, keys.changed, keys.removed);
+  std::vector<ObjectSnapshot> objects;
+  for (const auto& [id, object] : objects_) objects.push_back(object);
+  auto message = cloud_message(points_, appearance_by_stationarity(objects),
+                               static_cast<std::size_t>(rates_.surface_points), stamp_ns_,
+                               config_.node.map_frame);
+  surface_unsent_ = !surface_->write(message);
+}
+
+}  // namespace pocd::dds

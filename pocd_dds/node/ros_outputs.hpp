@@ -1,0 +1,72 @@
+// Topics that ROS 2 tools and fleet managers take as they are: markers, occupancy grid, surface,
+// obstacles.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "map_msgsPubSubTypes.h"
+#include "nav_msgsPubSubTypes.h"
+#include "pocd_dds/bridge/ros_messages.hpp"
+#include "pocd_dds/entities/writer.hpp"
+#include "pocd_dds/node/node_clock.hpp"
+#include "pocd_dds/node/node_config.hpp"
+#include "rmf_obstacle_msgsPubSubTypes.h"
+#include "sensor_msgsPubSubTypes.h"
+#include "visualization_msgsPubSubTypes.h"
+
+namespace pocd::dds {
+
+/// In two steps, so that the pipeline only waits for copies of what is new: collect() is called
+/// while the others' state is locked, send() after that. Not thread-safe.
+class RosOutputs {
+ public:
+  RosOutputs(const std::shared_ptr<Participant>& participant, const NodeFile& config,
+             std::uint64_t epoch);
+
+  /// Copies what the outputs that are due need; with `last`, the final state for those that keep
+  /// one.
+  void collect(const ObjectsById& objects, const std::map<TileKey, MapTile>& tiles,
+               StampNs stamp_ns, StampNs now_ns, bool last);
+  void send();
+  /// Of the topics that keep their last state.
+  bool wait_acknowledged(std::chrono::milliseconds time);
+
+ private:
+  void send_markers();
+  void send_obstacles();
+  void send_occupancy();
+  void send_surface();
+  void copy_tiles(const std::map<TileKey, MapTile>& tiles);
+
+  const NodeFile config_;
+  const RosOutputConfig& rates_;
+  const ObstacleOptions obstacle_options_;
+  std::unique_ptr<Writer<visualization_msgs::msg::MarkerArrayPubSubType>> markers_;
+  std::unique_ptr<Writer<nav_msgs::msg::OccupancyGridPubSubType>> grid_;
+  std::unique_ptr<Writer<map_msgs::msg::OccupancyGridUpdatePubSubType>> grid_updates_;
+  std::unique_ptr<Writer<sensor_msgs::msg::PointCloud2PubSubType>> surface_;
+  std::unique_ptr<Writer<rmf_obstacle_msgs::msg::ObstaclesPubSubType>> obstacles_;
+  Pace markers_pace_, occupancy_pace_, surface_pace_, obstacles_pace_;
+
+  // What collect() took for send().
+  bool markers_due_ = false, occupancy_due_ = false, surface_due_ = false, obstacles_due_ = false;
+  StampNs stamp_ns_ = 0, now_ns_ = 0;
+  bool last_ = false;
+  ObjectsById objects_;
+  std::map<TileKey, MapTile> tiles_;  // a copy of the published map
+  // Steps of that copy that the grid and the surface have not taken over yet; true: changed, else
+  // removed.
+  std::map<TileKey, bool> grid_steps_, surface_steps_;
+
+  bool first_markers_ = true;
+  Departures marker_departures_, obstacle_departures_;
+  OccupancyProjection projection_;
+  int grid_readers_ = 0;  // ever matched when the last whole grid was sent
+  bool grid_outdated_ = false;
+  SurfacePoints points_;
+  bool surface_unsent_ = false;
+};
+
+}  // namespace pocd::dds
