@@ -77,7 +77,7 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
   };
 
   add(app.add_option("--dataset", options.format,
-                     "Format of the inputs: torwic, rgbd, pcd, sim, mcap"))
+                     "Format of the inputs: torwic, toycar, rgbd, pcd, sim, mcap"))
       ->required();
   add(app.add_option(
           "--input", options.inputs,
@@ -94,7 +94,7 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
   add_text(
       "--gravity",
       [&options](const std::string& text) { options.gravity_W = parse_direction(text); },
-      "Unit vector x,y,z that points down in the inputs' world frame (rgbd)");
+      "Unit vector x,y,z that points down in the inputs' world frame (rgbd, toycar)");
   add_text(
       "--camera", [&options](const std::string& text) { options.camera = parse_camera(text); },
       "Intrinsics width,height,fx,fy,cx,cy [px] (pcd, torwic)");

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
@@ -66,6 +68,39 @@ cv::Mat read_label_image(const fs::path& file) {
                      ", a segmentation image has 1 channel of 8 or 16 bits (class index)");
   }
   return image;
+}
+
+cv::Mat read_metre_image(const fs::path& file) {
+  // OpenCV reads this format only where the environment says so, for fear of untrusted files.
+  static const bool allowed = ::setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 0) == 0;
+  const cv::Mat image = allowed ? read_image(file, cv::IMREAD_UNCHANGED) : cv::Mat();
+  if (image.depth() != CV_32F) {
+    throw InputError(file.string() + ": has " + kind_of(image) +
+                     ", a depth image in metres has floating-point numbers");
+  }
+  cv::Mat metres;
+  cv::extractChannel(image, metres, 0);
+  for (int v = 0; v < metres.rows; ++v) {
+    float* row = metres.ptr<float>(v);
+    for (int u = 0; u < metres.cols; ++u) {
+      if (!std::isfinite(row[u])) row[u] = 0.0f;
+    }
+  }
+  return metres;
+}
+
+cv::Mat read_id_image(const fs::path& file) {
+  const cv::Mat image = read_image(file, cv::IMREAD_UNCHANGED);
+  if (image.channels() < 3 || image.elemSize1() > 2) return read_label_image(file);
+  cv::Mat ids, other;
+  cv::extractChannel(image, ids, 0);
+  for (int channel = 1; channel < 3; ++channel) {
+    cv::extractChannel(image, other, channel);
+    if (cv::countNonZero(other != ids) > 0) {
+      throw InputError(file.string() + ": is coloured; a mask has ids, as grey");
+    }
+  }
+  return ids;
 }
 
 cv::Mat read_color_image(const fs::path& file) { return read_image(file, cv::IMREAD_COLOR); }

@@ -13,6 +13,10 @@ namespace pocd {
 cv::Mat read_depth_image(const std::filesystem::path& file);
 /// One channel of 8 or 16 bits, class indices.
 cv::Mat read_label_image(const std::filesystem::path& file);
+/// Floating-point image (OpenEXR), metres: the first channel; what is not finite is no return (0).
+cv::Mat read_metre_image(const std::filesystem::path& file);
+/// Ids of 8 or 16 bits, as one channel or as grey in three.
+cv::Mat read_id_image(const std::filesystem::path& file);
 /// Any picture, as 8-bit BGR.
 cv::Mat read_color_image(const std::filesystem::path& file);
 

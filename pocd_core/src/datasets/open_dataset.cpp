@@ -76,12 +76,13 @@ std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options) {
                      ", not in (0, 1000]");
   }
   if (options.format == "torwic") return open_torwic(options);
+  if (options.format == "toycar") return open_toycar(options);
   if (options.format == "rgbd") return open_rgbd(options);
   if (options.format == "pcd") return open_pcd_with_camera_file(options);
   if (options.format == "sim") return open_sim(options);
   if (options.format == "mcap") return open_recorded(options);
   throw InputError("dataset: format '" + options.format +
-                   "' is unknown, one of: torwic, rgbd, pcd, sim, mcap");
+                   "' is unknown, one of: torwic, toycar, rgbd, pcd, sim, mcap");
 }
 
 }  // namespace pocd

@@ -36,29 +36,14 @@ CameraModel read_intrinsics(const fs::path& file) {
   return camera;
 }
 
-Eigen::Quaterniond levelling(const Eigen::Vector3d& gravity_W, const std::string& source) {
-  if (!gravity_W.allFinite() || std::abs(gravity_W.norm() - 1.0) > 0.01) {
-    throw InputError(source + ": gravity must be a unit vector, has length " +
-                     std::to_string(gravity_W.norm()));
-  }
-  return Eigen::Quaterniond::FromTwoVectors(gravity_W, -Eigen::Vector3d::UnitZ());
-}
-
 class RgbdReader : public DatasetReader {
  public:
   explicit RgbdReader(const DatasetOptions& options)
       : period_ns_(std::llround(1e9 / options.frame_rate_hz)) {
     for (const fs::path& path : options.inputs) {
       require_folder(path);
-      Eigen::Vector3d gravity_W = options.gravity_W.value_or(-Eigen::Vector3d::UnitZ());
-      const fs::path gravity_file = path / "gravity.txt";
-      std::string source = "option gravity";
-      if (!options.gravity_W && fs::exists(gravity_file)) {
-        gravity_W = read_matrix(gravity_file, 1, 3).transpose();
-        source = gravity_file.string();
-      }
-      folders_.push_back(
-          {path, read_intrinsics(path / "camera-intrinsics.txt"), levelling(gravity_W, source)});
+      folders_.push_back({path, read_intrinsics(path / "camera-intrinsics.txt"),
+                          read_levelling(path, options.gravity_W)});
       list(folders_.size() - 1);
     }
   }

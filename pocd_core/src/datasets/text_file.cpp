@@ -79,4 +79,20 @@ Eigen::MatrixXd read_matrix(const std::filesystem::path& file, int rows, int col
   return out;
 }
 
+Eigen::Quaterniond read_levelling(const std::filesystem::path& folder,
+                                  const std::optional<Eigen::Vector3d>& gravity_W) {
+  Eigen::Vector3d down_W = gravity_W.value_or(-Eigen::Vector3d::UnitZ());
+  std::string source = "option gravity";
+  const std::filesystem::path file = folder / "gravity.txt";
+  if (!gravity_W && std::filesystem::exists(file)) {
+    down_W = read_matrix(file, 1, 3).transpose();
+    source = file.string();
+  }
+  if (!down_W.allFinite() || std::abs(down_W.norm() - 1.0) > 0.01) {
+    throw InputError(source + ": gravity must be a unit vector, has length " +
+                     std::to_string(down_W.norm()));
+  }
+  return Eigen::Quaterniond::FromTwoVectors(down_W, -Eigen::Vector3d::UnitZ());
+}
+
 }  // namespace pocd

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,5 +27,10 @@ std::vector<double> parse_numbers(const NumberedLine& line, std::size_t count,
 
 /// A matrix of `rows` x `columns` finite numbers, a row per line. Throws InputError.
 Eigen::MatrixXd read_matrix(const std::filesystem::path& file, int rows, int columns);
+
+/// Turns the world of a folder so that gravity points along -z: `gravity_W`, or the folder's
+/// gravity.txt (three numbers), or -z. Throws InputError unless it is a unit vector.
+Eigen::Quaterniond read_levelling(const std::filesystem::path& folder,
+                                  const std::optional<Eigen::Vector3d>& gravity_W);
 
 }  // namespace pocd

@@ -1,4 +1,5 @@
-// Frames from files, in order. Implementations: torwic, rgbd, pcd, recordings; and the simulator.
+// Frames from files, in order. Implementations: torwic, toycar, rgbd, pcd, recordings; and the
+// simulator.
 #pragma once
 
 #include <cstdint>
@@ -49,14 +50,14 @@ class DatasetReader {
 };
 
 struct DatasetOptions {
-  std::string format;  ///< "torwic", "rgbd", "pcd", "sim", "mcap"
+  std::string format;  ///< "torwic", "toycar", "rgbd", "pcd", "sim", "mcap"
   /// Visited in order as one run; stamps are shifted to go on. Folders, or scenario files for
   /// "sim".
   std::vector<std::filesystem::path> inputs;
   int repeat = 1;               ///< frames made of each still image (pcd), >= 1
   double frame_rate_hz = 15.0;  ///< for sources without stamps
   /// Unit vector pointing down in the source's world frame; frames are rotated so that it becomes
-  /// -z. Not given: the folder's gravity.txt (three numbers), or -z without one (rgbd).
+  /// -z. Not given: the folder's gravity.txt (three numbers), or -z without one (rgbd, toycar).
   std::optional<Eigen::Vector3d> gravity_W;
   std::uint64_t seed = 1;  ///< simulator noise
   /// Intrinsics of sources that do not bring their own (pcd), or other than TorWIC's (torwic).

@@ -24,8 +24,16 @@ std::unique_ptr<DatasetReader> open_pcd(const DatasetOptions& options);
 /// absent. Intrinsics and mount: options, or TorWIC's (method.md).
 std::unique_ptr<DatasetReader> open_torwic(const DatasetOptions& options);
 
-/// Recordings of the bus: MCAP files, rosbag2 .db3 files, or folders of them. Frames come in the order of
-/// their stamps; an input that begins before the one before it ended is moved behind it.
+/// Folders in the layout of Co-Fusion's synthetic sequences (Runz and Agapito, ICRA 2017), of which
+/// one shows ToyCar: calibration.txt (fx fy cx cy width height), depth_noise/ or depth_original/
+/// DepthNNNN.exr (metres; or 16-bit PNG, mm), trajectories/gt-cam-0.txt with `number tx ty tz qx qy
+/// qz qw` of the camera in the world, mask_id/MaskNNNN.png (ids as labels, optional),
+/// colour/ColorNNNN.png (optional), gravity.txt (ours, optional). No stamps: frame n of the listing
+/// has n / frame_rate. What of this is known from where: docs/evaluation.md.
+std::unique_ptr<DatasetReader> open_toycar(const DatasetOptions& options);
+
+/// Recordings of the bus: MCAP files, rosbag2 .db3 files, or folders of them. Frames come in the
+/// order of their stamps; an input that begins before the one before it ended is moved behind it.
 std::unique_ptr<DatasetReader> open_recorded(const DatasetOptions& options);
 
 }  // namespace pocd
