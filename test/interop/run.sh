@@ -63,6 +63,6 @@ pids=()
 node check.js run.mcap | tee check.log
 for topic in /robot1/depth/image_raw /robot1/segmentation /robot1/odom /robot2/depth/camera_info \
   /tf_static /clock pocd/map/tiles pocd/map/deltas pocd/map/manifest pocd/health pocd/frames \
-  /diagnostics; do
+  /diagnostics /pocd/map /pocd/surface /rmf_obstacles; do
   grep -q "^$topic: " check.log || { echo "interop: $topic was not recorded"; exit 1; }
 done
