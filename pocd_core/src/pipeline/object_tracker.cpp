@@ -72,8 +72,10 @@ void ObjectTracker::update_matched(Step& step) {
     const Observation& observation = step.observations.list[match.observation];
     object.frames_seen_through = 0;
     ++object.frames_in_view;
-    if (match.stationary && object.confirmed && shift_object(step, object, match, sighting))
+    if (config_.association.realign_displaced && match.stationary && object.confirmed &&
+        shift_object(step, object, match, sighting)) {
       continue;
+    }
     const double delta_m =
         geometric_change(object, observation, sighting, match, step.cloud, config_.change);
     step.evidence[object.id] =
@@ -127,7 +129,8 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   mark_changed(object);
   step.evidence[object.id] = apply_measurement(object, moved->sign * moved->displacement_m,
                                                sighting, config_.state, config_.change);
-  object.belief.mu = 0.0;  // change is measured from the new place on
+  // Change is measured from the new place on.
+  step.evidence[object.id].after.mu = object.belief.mu = 0.0;
   add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
   object.reported_box = object.box;
   object.gained = object.lost = 0;
@@ -142,9 +145,11 @@ void ObjectTracker::update_unmatched(Step& step) {
     if (matched[c]) continue;
     LibraryObject& object = *candidates_[c].object;
     const Sighting& sighting = candidates_[c].sighting;
-    if (sighting.visible_share() < config_.association.min_visible_share) continue;
+    const bool aware = config_.association.occlusion_aware;
+    const double share = aware ? sighting.visible_share() : sighting.in_view_share();
+    if (share < config_.association.min_visible_share) continue;
     if (!object.confirmed) ++object.frames_in_view;
-    if (!step.association.doubtful[c]) continue;
+    if (aware && !step.association.doubtful[c]) continue;
     ++object.frames_seen_through;
     step.evidence[object.id] = apply_measurement(object, config_.change.delta_max_m, sighting,
                                                  config_.state, config_.change);

@@ -13,6 +13,8 @@ struct AssociationConfig {
   double lambda_rotation = 1.0;
   double lambda_class = 1000.0;
   double min_visible_share = 0.20;
+  bool occlusion_aware = true;
+  bool realign_displaced = true;
   int icp_points = 600;
   int icp_iterations = 30;
   double icp_max_distance_m = 0.5;
@@ -36,6 +38,12 @@ struct AssociationConfig {
           "Share of an object's points that a frame must see, or see through, before the absence "
           "of an "
           "observation says anything, theta_vis.");
+    visit("occlusion_aware", occlusion_aware,
+          "Only what the camera sees through is evidence of absence; false: an object in the "
+          "frustum without an observation is taken as gone, as published.");
+    visit("realign_displaced", realign_displaced,
+          "Align a known object anew where much of what is seen of it is off; false: such an "
+          "observation is judged by the measured change alone, as published.");
     visit("icp_points", icp_points, Range{20, 100000}, "Points of an observation used by ICP.");
     visit("icp_iterations", icp_iterations, Range{1, 200}, "Iterations of ICP.");
     visit("icp_max_distance_m", icp_max_distance_m, Range{0.001, 10.0},

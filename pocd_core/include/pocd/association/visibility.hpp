@@ -61,6 +61,10 @@ struct Sighting {
 
   int visible() const { return hit + seen_through; }
   double visible_share() const { return total > 0 ? static_cast<double>(visible()) / total : 0.0; }
+  /// Share in the frustum and facing the camera, whatever stands before it.
+  double in_view_share() const {
+    return total > 0 ? static_cast<double>(visible() + occluded + unknown) / total : 0.0;
+  }
   double seen_through_share() const {
     return visible() > 0 ? static_cast<double>(seen_through) / visible() : 0.0;
   }
