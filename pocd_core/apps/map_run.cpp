@@ -127,11 +127,24 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
   timing.close();
 }
 
-void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary) {
+void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary,
+               std::ostream& log) {
   MapPublisher publisher(1, options.config.map);
   publisher.update(pipeline.map());
+  if (const auto problem = pipeline.map().take_problem()) {
+    log << *problem << '\n';
+    publisher.update(pipeline.map());  // without what is lost
+  }
   summary.map_digest = publisher.digest().hex();
   summary.map_blocks = pipeline.map().block_count();
+  const MapMemoryStatus memory = pipeline.map().memory_status();
+  summary.map_memory_bytes = memory.memory_bytes;
+  summary.map_blocks_on_disk = memory.blocks_on_disk;
+  summary.map_evictions = memory.evictions;
+  summary.map_returns = memory.returns;
+  summary.map_write_failures = memory.write_failures;
+  summary.map_blocks_lost = memory.blocks_lost;
+  summary.map_frames_over_budget = memory.frames_over_budget;
   const Mesh mesh = extract_mesh(publisher.tiles(), options.config.map.voxel_size_m,
                                  options.config.map.truncation_m());
   const std::vector<ObjectSnapshot> objects = pipeline.objects();
@@ -171,7 +184,7 @@ RunSummary run_map(const MapRunOptions& options, std::ostream& log) {
     throw InputError("no good frame in the inputs (" + std::to_string(summary.skipped) +
                      " skipped)");
   }
-  write_map(options, pipeline, summary);
+  write_map(options, pipeline, summary, log);
   write_summary(summary, options.output / "summary.yaml");
   return summary;
 }

@@ -118,6 +118,7 @@ void Node::Impl::process(const Frame& frame) {
   frames.processed(frame);
   for (const DroppedFrame& dropped : queue.take_dropped()) frames.dropped(dropped);
   objects.add(result, frame.stamp_ns);
+  counts.memory = pipeline.map().memory_status();
 }
 
 void Node::Impl::publish(bool now) {

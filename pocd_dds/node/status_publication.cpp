@@ -34,6 +34,20 @@ void add(diagnostic_msgs::msg::DiagnosticStatus& status, const std::string& key,
   status.values().push_back(entry);
 }
 
+void add_memory(diagnostic_msgs::msg::DiagnosticStatus& status, const MapMemoryStatus& memory) {
+  add(status, "map memory [bytes]", std::to_string(memory.memory_bytes));
+  add(status, "map blocks in memory", std::to_string(memory.blocks_in_memory));
+  if (!memory.limited) return;
+  add(status, "map memory budget [bytes]", std::to_string(memory.budget_bytes));
+  add(status, "map blocks on disk", std::to_string(memory.blocks_on_disk));
+  add(status, "map disk [bytes]", std::to_string(memory.disk_bytes));
+  add(status, "map regions evicted", std::to_string(memory.evictions));
+  add(status, "map regions brought back", std::to_string(memory.returns));
+  add(status, "map regions the disk did not take", std::to_string(memory.write_failures));
+  add(status, "map blocks lost", std::to_string(memory.blocks_lost));
+  add(status, "frames over the map memory budget", std::to_string(memory.frames_over_budget));
+}
+
 /// The node's instance in pocd/health: its epoch, which no other node has.
 std::array<std::uint8_t, 16> node_key(std::uint64_t epoch) {
   return object_uuid(epoch, ObjectId::kNone);
@@ -107,6 +121,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   add(node, "frames refused", std::to_string(work.refused));
   add(node, "frames dropped", std::to_string(dropped));
   add(node, "frames in queue", std::to_string(queued));
+  add_memory(node, work.memory);
   add(node, "processing [ms per frame]", std::to_string(work.processing_ms));
   add(node, "objects", std::to_string(work.objects));
   add(node, "map version", std::to_string(work.map_version));

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "diagnostic_msgsPubSubTypes.h"
+#include "pocd/map/map_memory.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/intake.hpp"
 #include "pocd_msgsPubSubTypes.h"
@@ -20,6 +21,7 @@ struct WorkStatus {
   std::string last_warning;
   std::uint64_t write_failures = 0;
   std::uint64_t map_bytes = 0, map_version = 0, objects = 0;
+  MapMemoryStatus memory;
   StampNs stamp_ns = 0;  ///< of the last frame
 };
 

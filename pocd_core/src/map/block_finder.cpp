@@ -188,12 +188,12 @@ void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp,
   for (int z = first_.z >> kShift; z <= (first_.z + size_z_ - 1) >> kShift; ++z) {
     for (int y = first_.y >> kShift; y <= (first_.y + size_y_ - 1) >> kShift; ++y) {
       for (int x = first_.x >> kShift; x <= (first_.x + size_x_ - 1) >> kShift; ++x) {
-        const std::vector<std::uint32_t>* members = store.region({x, y, z});
-        if (!members) continue;
+        BlockStore::Region* region = store.region({x, y, z});
+        if (!region) continue;
         const Eigen::Vector3d center_W =
             (Eigen::Vector3d(x, y, z).array() + 0.5) * block_m_ * (1 << kShift);
         if (farthest_depth(T_C_W * center_W, region_radius) == 0.0f) continue;
-        for (const std::uint32_t slot : *members) {
+        for (const std::uint32_t slot : store.enter(*region)) {
           const BlockKey& key = store.block(slot).key;
           const Eigen::Vector3d block_W =
               (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * block_m_;

@@ -3,130 +3,192 @@
 #include <algorithm>
 
 #include "pocd/common/check.hpp"
+#include "region.hpp"
 
 namespace pocd {
-namespace {
 
-BlockKey region_of(const BlockKey& key) {
-  constexpr int kShift = BlockStore::kRegionShift;
-  return {key.x >> kShift, key.y >> kShift, key.z >> kShift};
+BlockStore::BlockStore(const MapMemoryConfig& memory)
+    : memory_(memory), file_(memory.limited() ? new PageFile(memory.folder) : nullptr) {}
+BlockStore::~BlockStore() = default;
+
+const BlockStore::Region* BlockStore::region(const BlockKey& region_key) const {
+  const auto it = regions_.find(region_key);
+  return it == regions_.end() ? nullptr : it->second.get();
 }
 
-}  // namespace
-
-BlockStore::BlockStore() : table_(1024, kNoSlot) {}
-
-// Position of the key in the table, or of the empty entry where it would go.
-std::size_t BlockStore::probe(const BlockKey& key) const {
-  const std::size_t mask = table_.size() - 1;
-  std::size_t i = BlockKeyHash{}(key)&mask;
-  while (table_[i] != kNoSlot && !(block(table_[i]).key == key)) i = (i + 1) & mask;
-  return i;
+BlockStore::Region* BlockStore::region(const BlockKey& region_key) {
+  ++visits_.regions;
+  if (last_region_ && last_region_->key == region_key) return last_region_;
+  const auto it = regions_.find(region_key);
+  if (it == regions_.end()) return nullptr;
+  return last_region_ = it->second.get();
 }
 
-std::uint32_t BlockStore::find(const BlockKey& key) const { return table_[probe(key)]; }
+BlockStore::Region& BlockStore::find_or_make_region(const BlockKey& region_key) {
+  if (Region* known = region(region_key)) return *known;
+  std::unique_ptr<Region>& made = regions_[region_key];
+  made = std::make_unique<Region>();
+  made->key = region_key;
+  made->memory = std::make_unique<Region::InMemory>();
+  ++regions_in_memory_;
+  return *(last_region_ = made.get());
+}
 
-void BlockStore::grow_table() {
-  std::vector<std::uint32_t> old(table_.size() * 2, kNoSlot);
-  old.swap(table_);
-  for (const std::uint32_t slot : old) {
-    if (slot != kNoSlot) table_[probe(block(slot).key)] = slot;
-  }
+void BlockStore::unlink(Region& region) {
+  (region.newer ? region.newer->older : newest_) = region.older;
+  (region.older ? region.older->newer : oldest_) = region.newer;
+  region.newer = region.older = nullptr;
+}
+
+void BlockStore::see(Region& region) {
+  if (region.seen == pass_) return;
+  if (region.seen > 0) unlink(region);
+  region.seen = pass_;
+  region.older = newest_;
+  (newest_ ? newest_->newer : oldest_) = &region;
+  newest_ = &region;
+}
+
+const std::vector<std::uint32_t>& BlockStore::enter(Region& region) {
+  if (!region.memory) bring_back(region);
+  see(region);
+  visits_.blocks += region.memory->members.size();
+  return region.memory->members;
+}
+
+std::uint32_t BlockStore::find(const BlockKey& key) const {
+  const Region* r = region(key.region());
+  return r && r->memory ? r->memory->slot_of[Region::place(key)] : kNoSlot;
+}
+
+bool BlockStore::contains(const BlockKey& key) const {
+  const Region* r = region(key.region());
+  return r && r->present[Region::place(key)];
 }
 
 std::uint32_t BlockStore::find_or_allocate(const BlockKey& key) {
-  std::size_t i = probe(key);
-  if (table_[i] != kNoSlot) return table_[i];
-  if ((size_ + 1) * 2 > table_.size()) {
-    grow_table();
-    i = probe(key);
-  }
-  if (free_.empty()) {
-    const auto first = static_cast<std::uint32_t>(meta_.size());
-    chunks_.push_back(std::make_unique<VoxelBlock[]>(kChunkMask + 1));
-    meta_.resize(meta_.size() + kChunkMask + 1);
-    for (std::uint32_t n = kChunkMask + 1; n-- > 0;) free_.push_back(first + n);
-  }
-  const std::uint32_t slot = free_.back();
-  free_.pop_back();
-  table_[i] = slot;
-  ++size_;
+  Region& r = find_or_make_region(key.region());
+  if (!r.memory) bring_back(r);
+  see(r);
+  ++visits_.blocks;
+  const std::uint32_t known = r.memory->slot_of[Region::place(key)];
+  if (known != kNoSlot) return known;
+  const std::uint32_t slot = allocate(r, key);
   VoxelBlock& b = block(slot);
   b.tsdf.fill(0);
   b.weight.fill(0);
   b.owner.fill(0);
-  b.key = key;
-  std::vector<std::uint32_t>& members = regions_[region_of(key)];
-  Meta& meta = meta_[slot];
-  meta.stamp = 0;
-  meta.used = true;
-  meta.dirty = false;
-  meta.known = false;
-  meta.position_in_region = static_cast<std::uint32_t>(members.size());
-  members.push_back(slot);
+  r.present.set(Region::place(key));
+  ++size_;
   return slot;
 }
 
-void BlockStore::drop(std::uint32_t slot) {
-  Meta& meta = meta_[slot];
-  POCD_CHECK(meta.used);
-  const BlockKey key = block(slot).key;
-  if (meta.known) mark_dirty(slot);
+// The block's contents are left to the caller.
+std::uint32_t BlockStore::allocate(Region& region, const BlockKey& key) {
+  Region::InMemory& in = *region.memory;
+  if (in.free_slots.empty()) add_chunk(region);
+  const std::uint32_t slot = in.free_slots.back();
+  in.free_slots.pop_back();
+  in.slot_of[Region::place(key)] = slot;
+  Meta& m = meta(slot);
+  m.stamp = 0;
+  m.used = true;
+  m.dirty_list = 0;
+  m.position_in_region = static_cast<std::uint32_t>(in.members.size());
+  in.members.push_back(slot);
+  block(slot).key = key;
+  return slot;
+}
 
-  // Deletion without markers: later entries of the probe run move up (Knuth, TAOCP 6.4, R).
-  const std::size_t mask = table_.size() - 1;
-  std::size_t hole = probe(key);
-  for (std::size_t i = (hole + 1) & mask; table_[i] != kNoSlot; i = (i + 1) & mask) {
-    const std::size_t home = BlockKeyHash{}(block(table_[i]).key) & mask;
-    if (((i - home) & mask) >= ((i - hole) & mask)) {
-      table_[hole] = table_[i];
-      hole = i;
-    }
+void BlockStore::add_chunk(Region& region) {
+  make_room(sizeof(Chunk));
+  if (free_chunks_.empty()) {
+    free_chunks_.push_back(static_cast<std::uint32_t>(chunks_.size()));
+    chunks_.emplace_back();
   }
-  table_[hole] = kNoSlot;
+  const std::uint32_t number = free_chunks_.back();
+  free_chunks_.pop_back();
+  if (spare_.empty()) {
+    chunks_[number] = std::make_unique<Chunk>();
+  } else {
+    chunks_[number] = std::move(spare_.back());
+    spare_.pop_back();
+  }
+  ++chunk_count_;
+  chunks_[number]->region = &region;
+  region.memory->chunks.push_back(number);
+  for (std::uint32_t n = kChunkMask + 1; n-- > 0;) {
+    region.memory->free_slots.push_back(number << kChunkShift | n);
+  }
+}
 
-  const auto region = regions_.find(region_of(key));
-  std::vector<std::uint32_t>& members = region->second;
-  members[meta.position_in_region] = members.back();
-  meta_[members.back()].position_in_region = meta.position_in_region;
-  members.pop_back();
-  if (members.empty()) regions_.erase(region);
+void BlockStore::release_memory(Region& region) {
+  for (const std::uint32_t number : region.memory->chunks) {
+    if (spare_.size() < kSpareChunks) spare_.push_back(std::move(chunks_[number]));
+    chunks_[number].reset();
+    free_chunks_.push_back(number);
+    --chunk_count_;
+  }
+  region.memory.reset();
+  --regions_in_memory_;
+}
 
-  for (const std::uint32_t owner : meta.owners) {
+void BlockStore::erase(Region& region) {
+  if (last_region_ == &region) last_region_ = nullptr;
+  unlink(region);
+  release_memory(region);
+  regions_.erase(BlockKey(region.key));
+}
+
+void BlockStore::drop(std::uint32_t slot) {
+  Meta& m = meta(slot);
+  POCD_CHECK(m.used);
+  if (m.dirty_list != 0) mark_dirty(slot);
+  for (const std::uint32_t owner : m.owners) {
     const auto entry = owner_slots_.find(owner);
     std::vector<std::uint32_t>& slots = entry->second;
     *std::find(slots.begin(), slots.end(), slot) = slots.back();
     slots.pop_back();
     if (slots.empty()) owner_slots_.erase(entry);
   }
-  meta.owners.clear();
-  meta.used = false;
-  meta.stamp = 0;
-  free_.push_back(slot);
-  --size_;
-}
+  owner_entries_ -= m.owners.size();
+  m.owners.clear();
+  m.used = false;
 
-const std::vector<std::uint32_t>* BlockStore::region(const BlockKey& region_key) const {
-  const auto it = regions_.find(region_key);
-  return it == regions_.end() ? nullptr : &it->second;
+  Region& r = region_of_slot(slot);
+  Region::InMemory& in = *r.memory;
+  const std::uint32_t place = Region::place(block(slot).key);
+  in.members[m.position_in_region] = in.members.back();
+  meta(in.members.back()).position_in_region = m.position_in_region;
+  in.members.pop_back();
+  in.slot_of[place] = kNoSlot;
+  in.free_slots.push_back(slot);
+  r.present.reset(place);
+  --size_;
+  if (in.members.empty()) erase(r);
 }
 
 std::vector<BlockKey> BlockStore::sorted_keys() const {
   std::vector<BlockKey> keys;
   keys.reserve(size_);
-  for (std::uint32_t slot = 0; slot < meta_.size(); ++slot) {
-    if (meta_[slot].used) keys.push_back(block(slot).key);
+  for (const auto& [key, region] : regions_) {
+    for (std::uint32_t place = 0; place < kRegionBlocks; ++place) {
+      if (region->present[place]) keys.push_back(region->block_at(place));
+    }
   }
+  visits_.regions += regions_.size();
+  visits_.blocks += size_;
   std::sort(keys.begin(), keys.end());
   return keys;
 }
 
 void BlockStore::note_owner(std::uint32_t slot, std::uint32_t owner) {
   if (owner == 0) return;
-  std::vector<std::uint32_t>& owners = meta_[slot].owners;
+  std::vector<std::uint32_t>& owners = meta(slot).owners;
   if (std::find(owners.begin(), owners.end(), owner) != owners.end()) return;
   owners.push_back(owner);
   owner_slots_[owner].push_back(slot);
+  ++owner_entries_;
 }
 
 void BlockStore::note_owners(std::uint32_t slot) {
@@ -138,33 +200,42 @@ void BlockStore::note_owners(std::uint32_t slot) {
 }
 
 std::vector<std::uint32_t> BlockStore::take_owner(std::uint32_t owner) {
+  // Seen first, so that bringing a part of the owner back does not send another part away.
+  if (const auto here = owner_slots_.find(owner); here != owner_slots_.end()) {
+    for (const std::uint32_t slot : here->second) see(region_of_slot(slot));
+  }
+  if (const auto away = owner_regions_on_disk_.find(owner); away != owner_regions_on_disk_.end()) {
+    const std::vector<BlockKey> keys = away->second;  // bring_back changes the list
+    for (const BlockKey& key : keys) {
+      if (Region* r = region(key)) enter(*r);
+    }
+  }
   const auto entry = owner_slots_.find(owner);
   if (entry == owner_slots_.end()) return {};
   std::vector<std::uint32_t> slots = std::move(entry->second);
   owner_slots_.erase(entry);
   for (const std::uint32_t slot : slots) {
-    std::vector<std::uint32_t>& owners = meta_[slot].owners;
+    std::vector<std::uint32_t>& owners = meta(slot).owners;
     owners.erase(std::find(owners.begin(), owners.end(), owner));
   }
+  owner_entries_ -= slots.size();
+  visits_.blocks += slots.size();
   std::sort(slots.begin(), slots.end(),
             [this](std::uint32_t a, std::uint32_t b) { return block(a).key < block(b).key; });
   return slots;
 }
 
 void BlockStore::mark_dirty(std::uint32_t slot) {
-  if (meta_[slot].dirty) return;
-  meta_[slot].dirty = true;
-  meta_[slot].known = true;
+  Meta& m = meta(slot);
+  if (m.dirty_list == dirty_list_) return;
+  m.dirty_list = dirty_list_;
   dirty_.push_back(block(slot).key);
 }
 
 std::vector<BlockKey> BlockStore::take_dirty() {
   std::vector<BlockKey> keys = std::move(dirty_);
   dirty_.clear();
-  for (const BlockKey& key : keys) {
-    const std::uint32_t slot = find(key);
-    if (slot != kNoSlot) meta_[slot].dirty = false;
-  }
+  ++dirty_list_;  // no block is in the new list, in memory or on disk
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   return keys;

@@ -9,21 +9,29 @@
 
 #include "bytes.hpp"
 #include "map_digest.hpp"
+#include "pocd/common/check.hpp"
+#include "pocd/map/map_reader.hpp"
 #include "tile_codec.hpp"
 
 namespace pocd {
 namespace {
 
+// A tile lies within one region; those of a region follow each other, so that what is on disk is
+// read once.
 std::vector<TileKey> tiles_of(const std::vector<BlockKey>& blocks) {
   std::vector<TileKey> tiles;
   tiles.reserve(blocks.size());
   for (const BlockKey& key : blocks) tiles.push_back({key.x >> 1, key.y >> 1, key.z >> 1});
-  std::sort(tiles.begin(), tiles.end());
+  const auto region = [](const TileKey& t) { return BlockKey{2 * t.x, 2 * t.y, 2 * t.z}.region(); };
+  std::sort(tiles.begin(), tiles.end(), [&](const TileKey& a, const TileKey& b) {
+    const BlockKey ra = region(a), rb = region(b);
+    return ra == rb ? a < b : ra < rb;
+  });
   tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
   return tiles;
 }
 
-std::vector<std::uint8_t> encode(const TsdfMap& map, const TileKey& key, int min_weight) {
+std::vector<std::uint8_t> encode(MapReader& map, const TileKey& key, int min_weight) {
   std::array<const VoxelBlock*, 8> blocks;
   for (int i = 0; i < 8; ++i) {
     blocks[i] = map.find({2 * key.x + (i & 1), 2 * key.y + (i >> 1 & 1), 2 * key.z + (i >> 2)});
@@ -70,8 +78,17 @@ std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
   delta.epoch = epoch_;
   delta.base_version = version_;
   delta.version = version_ + 1;
+  MapReader reader(map);
+  const auto payload_of = [&](const TileKey& key) {
+    try {
+      return encode(reader, key, config_.min_publish_weight);
+    } catch (const InputError&) {  // on disk, and unreadable
+      map.recall({2 * key.x, 2 * key.y, 2 * key.z});
+      return encode(reader, key, config_.min_publish_weight);
+    }
+  };
   for (const TileKey& key : tiles_of(map.take_dirty())) {
-    std::vector<std::uint8_t> payload = encode(map, key, config_.min_publish_weight);
+    std::vector<std::uint8_t> payload = payload_of(key);
     const auto known = tiles_.find(key);
     if (known == tiles_.end() ? payload.empty() : known->second.payload == payload) continue;
     if (known != tiles_.end()) subtract(digest_, tile_digest(key, known->second.payload));
@@ -86,6 +103,9 @@ std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
     tiles_[key] = std::move(tile);
   }
   if (delta.changed.empty() && delta.removed.empty()) return std::nullopt;
+  std::sort(delta.changed.begin(), delta.changed.end(),
+            [](const MapTile& a, const MapTile& b) { return a.key < b.key; });
+  std::sort(delta.removed.begin(), delta.removed.end());
   version_ = delta.version;
   delta.digest = digest_;
   return delta;

@@ -2,8 +2,8 @@
 //   header, 48 bytes: "POCDMAP\0", u32 version, u32 blocks per part, f64 voxel size [m],
 //     f64 truncation [voxels], u64 number of blocks, u64 XXH3 of the 40 bytes before
 //   parts: u32 size of the zstd frame, u64 XXH3 of the frame, frame. The frame holds up to `blocks
-//     per part` blocks in canonical order: i32 x, y, z, then the i16 distances, u16 weights and
-//     u32 owners of its 512 voxels.
+//     per part` blocks, sorted by region, then by key (TsdfMap::keys_by_region): i32 x, y, z, then
+//     the i16 distances, u16 weights and u32 owners of its 512 voxels.
 #include "pocd/map/map_io.hpp"
 
 #define XXH_INLINE_ALL
@@ -15,13 +15,14 @@
 
 #include "bytes.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/map/map_reader.hpp"
 #include "zstd_codec.hpp"
 
 namespace pocd {
 namespace {
 
 constexpr char kMagic[8] = "POCDMAP";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderSize = 48, kPartHeaderSize = 12;
 constexpr std::size_t kBlocksPerPart = 256;
 constexpr std::size_t kBlockSize = 12 + VoxelBlock::kVoxels * (2 + 2 + 4);
@@ -57,6 +58,10 @@ BlockKey get_block(const std::uint8_t* in, TsdfMap& map) {
   for (std::uint16_t& w : block.weight) w = get<std::uint16_t>(in), in += 2;
   for (std::uint32_t& o : block.owner) o = get<std::uint32_t>(in), in += 4;
   return key;
+}
+
+bool in_order(const BlockKey& a, const BlockKey& b) {
+  return a.region() == b.region() ? a < b : a.region() < b.region();
 }
 
 // Reads exactly `size` bytes or rejects the file.
@@ -107,12 +112,13 @@ void save_map(const TsdfMap& map, const std::filesystem::path& file) {
               static_cast<std::streamsize>(bytes.size()));
   };
   write(header_of(map));
-  const std::vector<BlockKey> keys = map.sorted_keys();
+  const std::vector<BlockKey> keys = map.keys_by_region();
+  MapReader reader(map);
   for (std::size_t begin = 0; begin < keys.size(); begin += kBlocksPerPart) {
     std::vector<std::uint8_t> raw;
     raw.reserve(kBlocksPerPart * kBlockSize);
     for (std::size_t i = begin; i < std::min(keys.size(), begin + kBlocksPerPart); ++i) {
-      put_block(raw, *map.find(keys[i]));
+      put_block(raw, *reader.find(keys[i]));
     }
     const std::vector<std::uint8_t> frame = compress(raw, kLevel);
     std::vector<std::uint8_t> head;
@@ -153,7 +159,7 @@ TsdfMap load_map(const std::filesystem::path& file, const TsdfConfig& config) {
     }
     for (std::size_t i = 0; i < blocks; ++i) {
       const BlockKey key = get_block(&raw[i * kBlockSize], map);
-      if (previous && !(*previous < key)) {
+      if (previous && !in_order(*previous, key)) {
         throw InputError(name + ": blocks of the map file are out of order");
       }
       previous = key;

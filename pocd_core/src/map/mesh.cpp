@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "marching_cubes.hpp"
+#include "pocd/map/map_reader.hpp"
 #include "tsdf_kernel.hpp"
 
 namespace pocd {
@@ -11,6 +12,8 @@ namespace {
 
 constexpr int kSide = VoxelBlock::kSide;
 constexpr int kPadded = kSide + 1;
+// Blocks per piece of work: about two regions, because each piece reads what is on disk anew.
+constexpr std::size_t kGrain = 256;
 
 // A block with one layer of its neighbours at the upper sides.
 struct PaddedBlock {
@@ -21,7 +24,7 @@ struct PaddedBlock {
 
 constexpr int padded_index(int x, int y, int z) { return x + kPadded * (y + kPadded * z); }
 
-void fill(const TsdfMap& map, const BlockKey& key, int min_weight, PaddedBlock& out) {
+void fill(MapReader& map, const BlockKey& key, int min_weight, PaddedBlock& out) {
   const VoxelBlock* blocks[8];
   for (int n = 0; n < 8; ++n) {
     blocks[n] = map.find({key.x + (n & 1), key.y + (n >> 1 & 1), key.z + (n >> 2)});
@@ -49,10 +52,10 @@ struct BlockMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-void make_vertices(const TsdfMap& map, const BlockKey& key, int min_weight, BlockMesh& out) {
+void make_vertices(MapReader& map, const BlockKey& key, double voxel_m, int min_weight,
+                   BlockMesh& out) {
   PaddedBlock block;
   fill(map, key, min_weight, block);
-  const double voxel_m = map.config().voxel_size_m;
   for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
     const int at[3] = {v & 7, v >> 3 & 7, v >> 6};
     const int a = padded_index(at[0], at[1], at[2]);
@@ -73,7 +76,7 @@ void make_vertices(const TsdfMap& map, const BlockKey& key, int min_weight, Bloc
 
 // Calls triangle(i, j, k) with (block offset 0..7, code) pairs packed as 2048 * offset + code.
 template <class Triangle>
-void for_each_triangle(const TsdfMap& map, const BlockKey& key, int min_weight,
+void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight,
                        const Triangle& triangle) {
   PaddedBlock block;
   fill(map, key, min_weight, block);
@@ -129,21 +132,30 @@ Mesh compact(const std::vector<BlockMesh>& parts, const std::vector<std::uint32_
 
 Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool) {
   const int threshold = std::max(min_weight, 1);
-  const std::vector<BlockKey> keys = map.sorted_keys();
+  const double voxel_m = map.config().voxel_size_m;
+  // Region by region, so that none has to be read from disk often.
+  const std::vector<BlockKey> keys = map.keys_by_region();
+  const auto before = [](const BlockKey& a, const BlockKey& b) {
+    return a.region() == b.region() ? a < b : a.region() < b.region();
+  };
   std::vector<BlockMesh> parts(keys.size());
-  pool.parallel_for(keys.size(), 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) make_vertices(map, keys[b], threshold, parts[b]);
+  pool.parallel_for(keys.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    MapReader reader(map);
+    for (std::size_t b = begin; b < end; ++b) {
+      make_vertices(reader, keys[b], voxel_m, threshold, parts[b]);
+    }
   });
   std::vector<std::uint32_t> first(keys.size() + 1, 0);
   for (std::size_t b = 0; b < keys.size(); ++b) {
     first[b + 1] = first[b] + static_cast<std::uint32_t>(parts[b].codes.size());
   }
-  pool.parallel_for(keys.size(), 16, [&](std::size_t begin, std::size_t end) {
+  pool.parallel_for(keys.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    MapReader reader(map);
     for (std::size_t b = begin; b < end; ++b) {
       std::array<std::size_t, 8> neighbour;
       for (int n = 0; n < 8; ++n) {
         const BlockKey key{keys[b].x + (n & 1), keys[b].y + (n >> 1 & 1), keys[b].z + (n >> 2)};
-        neighbour[n] = std::lower_bound(keys.begin(), keys.end(), key) - keys.begin();
+        neighbour[n] = std::lower_bound(keys.begin(), keys.end(), key, before) - keys.begin();
       }
       const auto vertex = [&](int packed) {
         const std::size_t block = neighbour[packed >> 11];
@@ -151,7 +163,7 @@ Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool) {
         const auto at = std::lower_bound(codes.begin(), codes.end(), packed & 2047);
         return first[block] + static_cast<std::uint32_t>(at - codes.begin());
       };
-      for_each_triangle(map, keys[b], threshold, [&](int i, int j, int k) {
+      for_each_triangle(reader, keys[b], threshold, [&](int i, int j, int k) {
         parts[b].triangles.push_back({vertex(i), vertex(j), vertex(k)});
       });
     }

@@ -10,6 +10,8 @@ namespace {
 
 constexpr double kCellM = 2.0;
 
+std::int32_t cell_of(double v) { return static_cast<std::int32_t>(std::floor(v / kCellM)); }
+
 }  // namespace
 
 LibraryObject& ObjectLibrary::create(double spacing_m) {
@@ -56,14 +58,16 @@ void ObjectLibrary::unfile(ObjectId id) {
   filed_.erase(filed);
 }
 
+ObjectLibrary::Cell ObjectLibrary::cell_at(std::int32_t x, std::int32_t y) {
+  return static_cast<Cell>(static_cast<std::uint32_t>(x)) << 32 | static_cast<std::uint32_t>(y);
+}
+
 std::vector<ObjectLibrary::Cell> ObjectLibrary::cells_of(const Eigen::Vector2d& low,
                                                          const Eigen::Vector2d& high) {
-  const auto cell = [](double v) { return static_cast<std::int32_t>(std::floor(v / kCellM)); };
   std::vector<Cell> cells;
-  for (std::int32_t y = cell(low.y()); y <= cell(high.y()); ++y) {
-    for (std::int32_t x = cell(low.x()); x <= cell(high.x()); ++x) {
-      cells.push_back(static_cast<Cell>(static_cast<std::uint32_t>(x)) << 32 |
-                      static_cast<std::uint32_t>(y));
+  for (std::int32_t y = cell_of(low.y()); y <= cell_of(high.y()); ++y) {
+    for (std::int32_t x = cell_of(low.x()); x <= cell_of(high.x()); ++x) {
+      cells.push_back(cell_at(x, y));
     }
   }
   return cells;
@@ -84,11 +88,36 @@ std::vector<ObjectId> ObjectLibrary::near(const Eigen::Vector3d& center_W, doubl
   for (const Cell cell :
        cells_of(center_W.head<2>().array() - radius_m, center_W.head<2>().array() + radius_m)) {
     const auto it = grid_.find(cell);
+    ++visits_;
     if (it != grid_.end()) ids.insert(ids.end(), it->second.begin(), it->second.end());
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  visits_ += ids.size();
   return ids;
+}
+
+bool ObjectLibrary::any_near(const Eigen::Vector3d& center_W, double radius_m,
+                             const std::function<bool(const LibraryObject&)>& test) const {
+  const auto looks_fit = [&](std::int32_t x, std::int32_t y) {
+    ++visits_;
+    const auto it = grid_.find(cell_at(x, y));
+    if (it == grid_.end()) return false;
+    visits_ += it->second.size();
+    return std::any_of(it->second.begin(), it->second.end(),
+                       [&](ObjectId id) { return test(*objects_.at(id)); });
+  };
+  const std::int32_t cx = cell_of(center_W.x()), cy = cell_of(center_W.y());
+  const auto rings = static_cast<std::int32_t>(std::ceil(radius_m / kCellM));
+  for (std::int32_t ring = 0; ring <= rings; ++ring) {
+    for (std::int32_t x = -ring; x <= ring; ++x) {
+      const std::int32_t step = std::abs(x) == ring ? 1 : 2 * ring;  // sides, or top and bottom
+      for (std::int32_t y = -ring; y <= ring; y += step) {
+        if (looks_fit(cx + x, cy + y)) return true;
+      }
+    }
+  }
+  return false;
 }
 
 ObjectSnapshot snapshot(const LibraryObject& object) {

@@ -1,5 +1,6 @@
 #include "pocd/map/tsdf_map.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include "block_store.hpp"
@@ -10,7 +11,7 @@
 namespace pocd {
 
 struct TsdfMap::Impl {
-  explicit Impl(const TsdfConfig& c) : config(c) {}
+  explicit Impl(const TsdfConfig& c) : config(c), store(c.memory) {}
 
   // Blocks handed out by touch() may have got any owners since.
   void settle_touched() {
@@ -43,7 +44,9 @@ const TsdfConfig& TsdfMap::config() const { return impl_->config; }
 
 void TsdfMap::integrate(const IntegrationInput& input, ThreadPool& pool) {
   impl_->settle_touched();
+  impl_->store.begin_pass();
   impl_->integrator.integrate(impl_->config, input, impl_->store, pool);
+  impl_->store.keep_budget();
 }
 
 std::size_t TsdfMap::clear_object(ObjectId id) {
@@ -94,10 +97,13 @@ std::size_t TsdfMap::block_count() const { return impl_->store.size(); }
 
 const VoxelBlock* TsdfMap::find(const BlockKey& key) const {
   const std::uint32_t slot = impl_->store.find(key);
-  return slot == BlockStore::kNoSlot ? nullptr : &impl_->store.block(slot);
+  if (slot != BlockStore::kNoSlot) return &impl_->store.block(slot);
+  POCD_CHECK(!impl_->store.contains(key));
+  return nullptr;
 }
 
 VoxelBlock& TsdfMap::touch(const BlockKey& key) {
+  impl_->store.begin_pass();
   const std::uint32_t slot = impl_->store.find_or_allocate(key);
   impl_->store.mark_dirty(slot);
   impl_->touched.push_back(key);
@@ -106,6 +112,26 @@ VoxelBlock& TsdfMap::touch(const BlockKey& key) {
 
 std::vector<BlockKey> TsdfMap::sorted_keys() const { return impl_->store.sorted_keys(); }
 
+std::vector<BlockKey> TsdfMap::keys_by_region() const {
+  std::vector<BlockKey> keys = sorted_keys();
+  std::stable_sort(keys.begin(), keys.end(),
+                   [](const BlockKey& a, const BlockKey& b) { return a.region() < b.region(); });
+  return keys;
+}
+
 std::vector<BlockKey> TsdfMap::take_dirty() { return impl_->store.take_dirty(); }
+
+void TsdfMap::recall(const BlockKey& key) {
+  impl_->store.begin_pass();
+  if (BlockStore::Region* region = impl_->store.region(key.region())) impl_->store.enter(*region);
+}
+
+MapMemoryStatus TsdfMap::memory_status() const { return impl_->store.memory_status(); }
+
+std::optional<std::string> TsdfMap::take_problem() { return impl_->store.take_problem(); }
+
+MapVisits TsdfMap::visits() const { return impl_->store.visits(); }
+
+const BlockStore& TsdfMap::store() const { return impl_->store; }
 
 }  // namespace pocd

@@ -136,16 +136,12 @@ bool ObjectTracker::has_nearer_claim(const Step& step, const LibraryObject& foun
                                      ObjectId claimant, const OrientedBox& old_place) const {
   const Eigen::Vector3d& here_W = found.box.pose.position_W;
   const double distance = (old_place.pose.position_W - here_W).head<2>().norm();
-  for (const ObjectId id : library_.near(here_W, distance)) {
-    const LibraryObject& other = *library_.find(id);
+  return library_.any_near(here_W, distance, [&](const LibraryObject& other) {
     const bool unseen = step.frame.stamp_ns - other.last_seen_ns > kInPlaceNs;
-    if (id == claimant || id == found.id || !other.confirmed || !unseen ||
-        other.class_id != found.class_id || other.first_seen_ns >= found.first_seen_ns) {
-      continue;
-    }
-    if ((other.box.pose.position_W - here_W).head<2>().norm() < distance) return true;
-  }
-  return false;
+    return other.id != claimant && other.id != found.id && other.confirmed && unseen &&
+           other.class_id == found.class_id && other.first_seen_ns < found.first_seen_ns &&
+           (other.box.pose.position_W - here_W).head<2>().norm() < distance;
+  });
 }
 
 void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id,

@@ -98,6 +98,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
                    result);
   clock.done("objects");
   p.integrate(placed);
+  if (const auto problem = p.map.take_problem()) result.warnings.push_back(*problem);
   clock.done("map");
   return result;
 }
@@ -133,6 +134,7 @@ std::vector<ObjectSnapshot> PocdPipeline::objects() const {
   return list;
 }
 
+std::uint64_t PocdPipeline::object_visits() const { return impl_->tracker.library().visits(); }
 TsdfMap& PocdPipeline::map() { return impl_->map; }
 const TsdfMap& PocdPipeline::map() const { return impl_->map; }
 

@@ -22,6 +22,8 @@ struct RunSummary {
   std::uint64_t added = 0, updated = 0, moved = 0, removed = 0;
   std::uint64_t objects = 0;
   std::uint64_t map_blocks = 0;
+  std::uint64_t map_memory_bytes = 0, map_blocks_on_disk = 0, map_evictions = 0, map_returns = 0;
+  std::uint64_t map_write_failures = 0, map_blocks_lost = 0, map_frames_over_budget = 0;
   std::string map_digest;
   double seconds = 0.0;
   PipelineConfig config;
@@ -42,6 +44,17 @@ struct RunSummary {
     visit("removed", removed, any, "Events REMOVED.");
     visit("objects", objects, any, "Objects in the library at the end.");
     visit("map_blocks", map_blocks, any, "Blocks of 8 x 8 x 8 voxels in the map at the end.");
+    visit("map_memory_bytes", map_memory_bytes, any,
+          "Memory of voxels and their index at the end [bytes].");
+    visit("map_blocks_on_disk", map_blocks_on_disk, any,
+          "Those of `map_blocks` that the memory budget has sent to disk.");
+    visit("map_evictions", map_evictions, any, "Regions of 8 x 8 x 8 blocks written to disk.");
+    visit("map_returns", map_returns, any, "Regions read back because they were seen again.");
+    visit("map_write_failures", map_write_failures, any,
+          "Regions that the disk did not take: they stayed in memory.");
+    visit("map_blocks_lost", map_blocks_lost, any, "Blocks that could not be read back.");
+    visit("map_frames_over_budget", map_frames_over_budget, any,
+          "Frames that needed more than the memory budget at once.");
     visit("map_digest", map_digest, "Digest of the published map at the end.");
     visit("seconds", seconds, any, "Wall time of reading and processing [s].");
     visit.group("config", config, "The effective configuration.");

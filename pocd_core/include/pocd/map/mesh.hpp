@@ -17,8 +17,8 @@ struct Mesh {
 };
 
 /// Lorensen and Cline 1987 over every cell whose 8 voxels have weight >= min_weight; vertices
-/// shared between cells are merged, order is canonical (by block key), so equal maps give equal
-/// meshes.
+/// shared between cells are merged, order is that of TsdfMap::keys_by_region, so equal maps give
+/// equal meshes.
 Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool);
 
 /// The same from a copy of the published tiles (what a subscriber holds).

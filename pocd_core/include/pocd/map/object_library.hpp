@@ -1,6 +1,7 @@
 // The objects the system believes in, and those it is about to.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -63,12 +64,23 @@ class ObjectLibrary {
 
   /// Ids of objects whose box may lie within `radius_m` of `center_W` (horizontally), ascending.
   std::vector<ObjectId> near(const Eigen::Vector3d& center_W, double radius_m) const;
+  /// Whether `test` holds for one of them. Looks from the centre outwards and no further than it
+  /// must: with objects all over the place, that is not far.
+  bool any_near(const Eigen::Vector3d& center_W, double radius_m,
+                const std::function<bool(const LibraryObject&)>& test) const;
 
   std::size_t size() const { return objects_.size(); }
-  const std::map<ObjectId, std::unique_ptr<LibraryObject>>& all() const { return objects_; }
+  const std::map<ObjectId, std::unique_ptr<LibraryObject>>& all() const {
+    visits_ += objects_.size();
+    return objects_;
+  }
+  /// Objects and cells of the grid that were looked at by place, or handed out by all(), so far:
+  /// what a frame costs must not grow with the library.
+  std::uint64_t visits() const { return visits_; }
 
  private:
   using Cell = std::uint64_t;
+  static Cell cell_at(std::int32_t x, std::int32_t y);
   static std::vector<Cell> cells_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
   void unfile(ObjectId id);
 
@@ -76,6 +88,7 @@ class ObjectLibrary {
   std::unordered_map<Cell, std::vector<ObjectId>> grid_;
   std::unordered_map<std::uint32_t, std::vector<Cell>> filed_;
   std::uint32_t next_id_ = 1;
+  mutable std::uint64_t visits_ = 0;
 };
 
 ObjectSnapshot snapshot(const LibraryObject& object);

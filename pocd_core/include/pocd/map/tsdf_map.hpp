@@ -3,7 +3,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <unordered_map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "pocd/common/thread_pool.hpp"
@@ -11,9 +12,12 @@
 #include "pocd/config/describe.hpp"
 #include "pocd/input/depth_noise.hpp"
 #include "pocd/input/frame.hpp"
+#include "pocd/map/map_memory.hpp"
 #include "pocd/map/voxel_block.hpp"
 
 namespace pocd {
+
+class BlockStore;
 
 struct TsdfConfig {
   double voxel_size_m = 0.05;
@@ -21,6 +25,7 @@ struct TsdfConfig {
   double max_depth_m = 3.0;
   int max_weight = 100;
   int min_publish_weight = 2;
+  MapMemoryConfig memory;
 
   double truncation_m() const { return truncation_voxels * voxel_size_m; }
 
@@ -35,6 +40,7 @@ struct TsdfConfig {
           "Cap of a voxel's weight [observations]: smaller reacts faster, larger averages longer.");
     visit("min_publish_weight", min_publish_weight, Range{1, 1000},
           "Weight at which a voxel counts as observed in published tiles [observations].");
+    visit.group("memory", memory, "How much memory the voxels may take.");
   }
 };
 
@@ -51,8 +57,13 @@ struct IntegrationInput {
 };
 
 /// Not thread-safe: one writer, no reader beside it.
+///
+/// With a memory budget the least recently seen regions are on disk, and come back when a member
+/// that changes the map meets them. A region that cannot be read back is lost: counted, reported by
+/// take_problem(), and its blocks are dirty, so that copies of the map lose it too.
 class TsdfMap {
  public:
+  /// Throws InputError when the configuration is of no use.
   explicit TsdfMap(const TsdfConfig& config);
   ~TsdfMap();
   TsdfMap(TsdfMap&&) noexcept;
@@ -74,18 +85,31 @@ class TsdfMap {
   /// Voxels of `from` become voxels of `to` (two library entries found to be one thing).
   std::size_t reassign_object(ObjectId from, ObjectId to);
 
-  std::size_t block_count() const;
-  /// Null where nothing is allocated. Valid until the next change of the map.
+  std::size_t block_count() const;  ///< in memory and on disk
+  /// Null where nothing is allocated. Valid until the next change of the map. The block must be in
+  /// memory, as all are without a budget: MapReader finds those on disk.
   const VoxelBlock* find(const BlockKey& key) const;
   /// For tests and loading: the block at key, allocated when missing; marked dirty.
   VoxelBlock& touch(const BlockKey& key);
   /// Keys of all blocks in canonical order (BlockKey::operator<).
   std::vector<BlockKey> sorted_keys() const;
+  /// The same keys, sorted by region, then by key: the order for reading the whole map.
+  std::vector<BlockKey> keys_by_region() const;
 
   /// Keys of blocks changed (or dropped) since the last call, canonical order; clears the list.
   std::vector<BlockKey> take_dirty();
 
+  /// Brings the region of a block back to memory, or finds that it is lost.
+  void recall(const BlockKey& key);
+  MapMemoryStatus memory_status() const;
+  /// The first thing that went wrong with the disk since the last call, one line.
+  std::optional<std::string> take_problem();
+  /// Parts of the map that were handed out since it was made.
+  MapVisits visits() const;
+
  private:
+  friend class MapReader;
+  const BlockStore& store() const;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -2,18 +2,22 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <cstddef>
+#include <cstdint>
 
 namespace pocd {
 
 /// Integer coordinates of a block: block b covers [8 b, 8 b + 8) voxels per axis in the map frame.
 struct BlockKey {
+  /// A region is 8 x 8 x 8 blocks: what is kept in memory or on disk as a whole.
+  static constexpr int kRegionShift = 3;
+
   std::int32_t x = 0, y = 0, z = 0;
   bool operator==(const BlockKey& o) const { return x == o.x && y == o.y && z == o.z; }
   bool operator<(const BlockKey& o) const {  // z-major, the canonical order of every listing
     return z != o.z ? z < o.z : y != o.y ? y < o.y : x < o.x;
   }
+  BlockKey region() const { return {x >> kRegionShift, y >> kRegionShift, z >> kRegionShift}; }
 };
 
 struct BlockKeyHash {
@@ -25,10 +29,10 @@ struct BlockKeyHash {
   }
 };
 
-/// Voxel (x, y, z) of a block, each in [0, 8), is element x + 8 (y + 8 z) of every array. Its centre
-/// is at (8 key + (x, y, z) + 0.5) * voxel_size_m in the map frame.
-/// tsdf: signed distance to the surface over the truncation distance, times 32767; positive in front.
-/// weight: 0 = never seen. owner: index of the ObjectId that the voxel belongs to, 0 = background.
+/// Voxel (x, y, z) of a block, each in [0, 8), is element x + 8 (y + 8 z) of every array. Its
+/// centre is at (8 key + (x, y, z) + 0.5) * voxel_size_m in the map frame. tsdf: signed distance to
+/// the surface over the truncation distance, times 32767; positive in front. weight: 0 = never
+/// seen. owner: index of the ObjectId that the voxel belongs to, 0 = background.
 struct VoxelBlock {
   static constexpr int kSide = 8;
   static constexpr int kVoxels = kSide * kSide * kSide;

@@ -1,0 +1,97 @@
+#include "scale_halls.hpp"
+
+#include <cmath>
+
+#include "heap_counter.hpp"
+#include "test_room.hpp"
+
+namespace pocd::benchmark {
+namespace {
+
+constexpr double kLength_m = 12.8, kWidth_m = 8.0, kGap_m = 6.4;
+constexpr StampNs kPeriod_ns = 66'666'667;
+
+Scene hall() {
+  Scene scene;
+  scene.objects.push_back(test::solid(test::kFloorClass, {kLength_m / 2, kWidth_m / 2},
+                                      {kLength_m, kWidth_m, 0.2}, 0.0, -0.2));
+  for (int i = 0; i < 5; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      scene.objects.push_back(test::solid(test::kBoxClass, {1.6 + 2.4 * i, 2.2 + 3.6 * j},
+                                          {0.6, 0.6, 0.7 + 0.1 * (i % 3)}, 0.2 * i));
+    }
+  }
+  return scene;
+}
+
+// Looking along +x, down by 0.45 rad.
+Pose camera_at(double x_m, double y_m) { return test::look_from({x_m, y_m, 1.3}, -M_PI / 2, 0.45); }
+
+}  // namespace
+
+PipelineConfig scale_config() {
+  PipelineConfig config = test::room_config();
+  // Frames lie further apart than those of a slow robot, and halls far apart.
+  config.pose_gate.max_speed_mps = 100.0;
+  return config;
+}
+
+std::vector<Frame> drive_through_hall(double step_m, std::uint64_t seed) {
+  const Scene scene = hall();
+  const CameraModel camera{160, 120, 100.0, 100.0, 79.5, 59.5};
+  std::vector<Frame> frames;
+  for (const double y : {0.7, 4.0, 7.3}) {
+    for (double x = -2.0; x < kLength_m - 1.0; x += step_m) {
+      const Pose T_W_C = camera_at(x, y);
+      const RenderedFrame picture = render(scene, camera, T_W_C, false);
+      Frame frame;
+      frame.sequence = frames.size();
+      frame.camera = camera;
+      frame.T_W_C = T_W_C;
+      frame.depth_m = picture.depth_m;
+      frame.labels = picture.labels;
+      test::add_noise(frame, scale_config().depth_noise, seed);
+      frames.push_back(std::move(frame));
+    }
+  }
+  return frames;
+}
+
+Site::Site(const PipelineConfig& config, int halls, const std::vector<Frame>& drive)
+    : halls_(halls), publisher_(1, config.map) {
+  const std::uint64_t start = heap_in_use();
+  pipeline_ = std::make_unique<PocdPipeline>(config);
+  const int columns = static_cast<int>(std::ceil(std::sqrt(halls)));
+  for (int n = 0; n < halls; ++n) {
+    const double x_m = (n % columns) * (kLength_m + kGap_m);
+    const double y_m = (n / columns) * (kWidth_m + kGap_m);
+    for (const Frame& frame : drive) process_at(frame, x_m, y_m, "robot" + std::to_string(n));
+    const std::uint64_t between = heap_in_use();
+    publish();
+    publisher_heap_ += heap_in_use() - between;
+  }
+  pipeline_heap_ = heap_in_use() - start - publisher_heap_;
+}
+
+void Site::process_at(Frame frame, double x_m, double y_m, const std::string& robot) {
+  frame.T_W_C.translation() += Eigen::Vector3d(x_m, y_m, 0.0);
+  frame.stamp_ns = stamp_ns_ += kPeriod_ns;
+  frame.sequence = sequence_++;
+  frame.robot = robot;
+  pipeline_->process_frame(frame);
+}
+
+FrameResult Site::process(const Frame& frame) {
+  Frame now = frame;  // shares the images
+  now.stamp_ns = stamp_ns_ += kPeriod_ns;
+  now.sequence = sequence_++;
+  now.robot = "robot0";
+  return pipeline_->process_frame(now);
+}
+
+std::size_t Site::publish() {
+  const auto delta = publisher_.update(pipeline_->map());
+  return delta ? delta->changed.size() : 0;
+}
+
+}  // namespace pocd::benchmark
