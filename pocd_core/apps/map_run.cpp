@@ -91,7 +91,8 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
     }
     const auto read_start = std::chrono::steady_clock::now();
     std::optional<Frame> frame = reader->next();
-    // The pose that a node would get, in every bit; a recording's frames have made that way already.
+    // The pose that a node would get, in every bit; a recording's frames have made that way
+    // already.
     if (frame && options.dataset.format != "mcap") {
       frame->T_W_C = through_messages(frame->T_W_C, reader->extrinsics().T_B_C);
     }
@@ -150,8 +151,8 @@ void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary&
   const std::vector<ObjectSnapshot> objects = pipeline.objects();
   summary.objects = objects.size();
   const ClassMap& classes = options.config.classes;
-  write_objects_csv(objects, [&](ClassId id) { return classes.name(id); },
-                    options.output / "objects.csv");
+  write_objects_csv(
+      objects, [&](ClassId id) { return classes.name(id); }, options.output / "objects.csv");
   write_ply(mesh, appearance_by_stationarity(objects), options.output / "map.ply");
   write_birdseye(mesh, objects, options.output / "birdseye.png");
 }

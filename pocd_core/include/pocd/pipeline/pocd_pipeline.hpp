@@ -25,8 +25,8 @@ class PocdPipeline {
 
   /// Confirmed objects by id.
   std::vector<ObjectSnapshot> objects() const;
-  /// Objects and places that were looked at so far (ObjectLibrary::visits); TsdfMap::visits tells the
-  /// same of the map.
+  /// Objects and places that were looked at so far (ObjectLibrary::visits); TsdfMap::visits tells
+  /// the same of the map.
   std::uint64_t object_visits() const;
   TsdfMap& map();
   const TsdfMap& map() const;
