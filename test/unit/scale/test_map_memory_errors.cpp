@@ -139,7 +139,7 @@ TEST(MapMemoryErrors, FullDiskLosesNothing) {
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   rlimit tight = before;
-  tight.rlim_cur = 100'000;
+  tight.rlim_cur = 4096;  // one small page
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
   drive(map, 0.0, 40.0);
   drive(map, 40.0, 0.0);
