@@ -61,6 +61,8 @@ bool in_doubt(const Candidate& candidate, const Observations& observations) {
 std::shared_ptr<const IcpTarget> target_of(LibraryObject& object, double max_distance_m) {
   if (!object.icp_target) {
     Points points, normals;
+    points.reserve(object.model.surfels().size());
+    normals.reserve(object.model.surfels().size());
     for (const Surfel& s : object.model.surfels()) {
       points.push_back(s.point_W);
       normals.push_back(s.normal_W);
@@ -81,6 +83,7 @@ Eigen::Vector3d centroid(const Points& points) {
 Points icp_source(const Observation& observation, const AssociationConfig& config) {
   Points source;
   const std::size_t step = std::max<std::size_t>(1, observation.points.size() / config.icp_points);
+  source.reserve(observation.points.size() / step + 1);
   for (std::size_t i = 0; i < observation.points.size(); i += step) {
     source.push_back(observation.points[i].point_W);
   }

@@ -77,6 +77,8 @@ IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inl
   while (levels_.back().cell_m < max_correspondence_m) {
     const Level& below = levels_.back();
     std::vector<Eigen::Vector3f> fewer, fewer_normals;
+    fewer.reserve(below.points.size());
+    fewer_normals.reserve(below.points.size());
     for (std::size_t c = 0; c + 1 < below.begin.size(); ++c) {
       if (below.begin[c] == below.begin[c + 1]) continue;
       // The middle one of the cell in input order: as good as any, and always the same.
@@ -93,19 +95,28 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
   if ((cell < 1).any() || (cell > level.cells - 2).any()) return;
   const Eigen::Array3f below = query.array() - (cell - kBorder).cast<float>() * level.cell_m;
   const Eigen::Array3f above = level.cell_m - below;
-  std::uint32_t found = static_cast<std::uint32_t>(level.points.size());
+  const float gap_y[3] = {square(below.y()), 0.0f, square(above.y())};
+  const float gap_z[3] = {square(below.z()), 0.0f, square(above.z())};
+  const int center = level.flat_index(cell);
+  const int row_y = level.cells.x(), row_z = level.cells.x() * level.cells.y();
+  const std::uint32_t* const begin = level.begin.data();
+  const Eigen::Vector3f* const points = level.points.data();
+  const auto none = static_cast<std::uint32_t>(level.points.size());
+  std::uint32_t found = none;
+  float nearest = best.squared_distance_m2;
   for (const auto& [dy, dz] : kRows) {
-    const float gap_y = dy == 0 ? 0.0f : dy < 0 ? below.y() : above.y();
-    const float gap_z = dz == 0 ? 0.0f : dz < 0 ? below.z() : above.z();
-    if (square(gap_y) + square(gap_z) >= best.squared_distance_m2) continue;
-    const int middle = level.flat_index(cell + Eigen::Array3i(0, dy, dz));
-    const std::uint32_t end = level.begin[middle + 2];
-    for (std::uint32_t i = level.begin[middle - 1]; i < end; ++i) {
-      const float d2 = (level.points[i] - query).squaredNorm();
-      if (d2 < best.squared_distance_m2) best.squared_distance_m2 = d2, found = i;
+    if (gap_y[dy + 1] + gap_z[dz + 1] >= nearest) continue;
+    const int middle = center + dy * row_y + dz * row_z;
+    const std::uint32_t end = begin[middle + 2];
+    for (std::uint32_t i = begin[middle - 1]; i < end; ++i) {
+      const float d2 = (points[i] - query).squaredNorm();
+      const bool closer = d2 < nearest;
+      nearest = closer ? d2 : nearest;
+      found = closer ? i : found;
     }
   }
-  if (found == level.points.size()) return;
+  if (found == none) return;
+  best.squared_distance_m2 = nearest;
   best.point = level.points[found];
   best.normal = level.normals[found];
 }

@@ -5,6 +5,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "pocd/common/rounding.hpp"
+
 namespace pocd {
 
 void DepthField::update(const OrganizedCloud& cloud) {
@@ -92,8 +94,8 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
     ++out.total;
     const Eigen::Vector3f p_C = T_C_W * surfel.point_W;
     if (p_C.z() < kMinDepth || p_C.z() > max_depth) continue;
-    const Projected at{static_cast<int>(std::lround(fx * p_C.x() / p_C.z() + cx)),
-                       static_cast<int>(std::lround(fy * p_C.y() / p_C.z() + cy)), p_C.z()};
+    const Projected at{round_to_int(fx * p_C.x() / p_C.z() + cx),
+                       round_to_int(fy * p_C.y() / p_C.z() + cy), p_C.z()};
     if (at.col < 0 || at.row < 0 || at.col >= cloud.width || at.row >= cloud.height) continue;
     const Eigen::Vector3f ray = eye_W - surfel.point_W;
     // Less than about six degrees between ray and surface measures nothing.

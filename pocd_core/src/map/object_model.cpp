@@ -130,14 +130,26 @@ void ObjectModel::transform(const Pose& T_new_old) {
 }
 
 void ObjectModel::rebuild_index() {
-  index_.clear();
-  std::vector<Surfel> kept;
-  kept.reserve(surfels_.size());
-  for (const Surfel& s : surfels_) {
-    if (index_.try_emplace(cell_of(s.point_W), static_cast<std::int32_t>(kept.size())).second)
-      kept.push_back(s);
+  // The nodes of the index are used again: a clear() would ask for memory for every surfel.
+  std::vector<decltype(index_)::node_type> nodes;
+  nodes.reserve(index_.size());
+  while (!index_.empty()) nodes.push_back(index_.extract(index_.begin()));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < surfels_.size(); ++i) {
+    const std::uint64_t cell = cell_of(surfels_[i].point_W);
+    if (index_.find(cell) != index_.end()) continue;
+    const auto next = static_cast<std::int32_t>(kept);
+    if (nodes.empty()) {
+      index_.emplace(cell, next);
+    } else {
+      nodes.back().key() = cell;
+      nodes.back().mapped() = next;
+      index_.insert(std::move(nodes.back()));
+      nodes.pop_back();
+    }
+    surfels_[kept++] = surfels_[i];
   }
-  surfels_.swap(kept);
+  surfels_.erase(surfels_.begin() + static_cast<std::ptrdiff_t>(kept), surfels_.end());
 }
 
 }  // namespace pocd

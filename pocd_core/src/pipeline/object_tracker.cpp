@@ -198,6 +198,8 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) 
 
 void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
   Points points, normals;
+  points.reserve(object.model.surfels().size());
+  normals.reserve(object.model.surfels().size());
   const int min_hits = object.observations > 4 ? kEstablishedHits : 1;
   for (const Surfel& s : object.model.surfels()) {
     if (s.hits < min_hits || s.seen_through >= 3) continue;

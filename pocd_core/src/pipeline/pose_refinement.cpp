@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "pocd/common/rounding.hpp"
+
 namespace pocd {
 namespace {
 
@@ -48,8 +50,8 @@ class Aligner {
       if (s.hits < kTrustedHits || s.seen_through > 0 || s.normal_W.squaredNorm() < 0.5f) continue;
       const Eigen::Vector3f p_C = T_C_W * s.point_W;
       if (p_C.z() < 0.1f || p_C.z() > max_depth_) continue;
-      const int col = static_cast<int>(std::lround(fx * p_C.x() / p_C.z() + cx));
-      const int row = static_cast<int>(std::lround(fy * p_C.y() / p_C.z() + cy));
+      const int col = round_to_int(fx * p_C.x() / p_C.z() + cx);
+      const int row = round_to_int(fy * p_C.y() / p_C.z() + cy);
       if (col < 0 || row < 0 || col >= cloud_.width || row >= cloud_.height) continue;
       const std::size_t i = static_cast<std::size_t>(row) * cloud_.width + col;
       if (cloud_.kind[i] != PixelKind::kObject && cloud_.kind[i] != PixelKind::kBackground)

@@ -62,10 +62,16 @@ std::optional<double> heading_of_normals(const Points& normals_W) {
   constexpr double kAgreement = 0.7;  // mean resultant length of four times the angle
   double c = 0.0, s = 0.0;
   std::size_t count = 0;
+  // Points of one plane share its normal, and follow each other.
+  Eigen::Vector3f last = Eigen::Vector3f::Zero();
+  double last_c = 0.0, last_s = 0.0;
   for (const Eigen::Vector3f& n : normals_W) {
     if (n.squaredNorm() < 0.5f || std::abs(n.z()) > kUpright) continue;
-    const double angle = 4.0 * std::atan2(n.y(), n.x());
-    c += std::cos(angle), s += std::sin(angle);
+    if (n != last) {
+      const double angle = 4.0 * std::atan2(n.y(), n.x());
+      last = n, last_c = std::cos(angle), last_s = std::sin(angle);
+    }
+    c += last_c, s += last_s;
     ++count;
   }
   if (count < 10 || 5 * count < normals_W.size()) return std::nullopt;

@@ -2,34 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <unordered_map>
+
+#include "pocd/common/cell_index.hpp"
+#include "pocd/common/kernel.hpp"
 
 namespace pocd {
 namespace {
 
-/// Union-find over pixels with path halving; the root is the smallest index, so labels do not
-/// depend on the order of joins.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t size) : parent_(size) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  std::int32_t root(std::int32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::int32_t a, std::int32_t b) {
-    a = root(a), b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
+/// Which neighbours a pixel is joined with. A farther one is asked only where the nearer is not.
+constexpr std::int32_t kRight = 1, kRight2 = 2, kDown = 4, kDown2 = 8;
 
- private:
-  std::vector<std::int32_t> parent_;
+/// Memory of this file, kept from frame to frame so that none is asked for per point.
+struct Memory {
+  struct CellSum {
+    Eigen::Vector3f point, normal;
+    float sigma = 0.0f;
+    int count = 0;
+  };
+  // Per grid pixel.
+  std::vector<std::uint32_t> key;   // class and instance
+  std::vector<float> limit2;        // squared reach to neighbours; negative: no object pixel
+  std::vector<std::int32_t> links;  // bits: which neighbours belong to the same thing
+  std::vector<std::int32_t> run_of;
+  // Per run.
+  std::vector<std::int32_t> parent;  // union-find
+  std::vector<std::int32_t> component;
+  CellIndex cells;
+  std::vector<CellSum> sums;
+  std::vector<std::vector<std::int32_t>> members;  // spare lists
+  Points box_points, box_normals;
 };
 
 struct Cluster {
-  std::int32_t root = 0;
   ClassId class_id = 0;
   std::uint16_t instance = 0;
   int pixels = 0;
@@ -38,73 +42,157 @@ struct Cluster {
   OrientedBox box;
 };
 
-/// Whether object pixel b belongs with object pixel a, whose largest distance to neighbours is
-/// given.
-bool connected(const OrganizedCloud& cloud, std::int32_t a, std::int32_t b, float limit_m) {
-  if (cloud.kind[b] != PixelKind::kObject || cloud.label[a] != cloud.label[b] ||
-      cloud.instance[a] != cloud.instance[b]) {
-    return false;
+/// Squared distance up to which neighbours of a pixel at `depth` belong with it.
+POCD_KERNEL void square_limits(const float* __restrict depth, int count, float tolerance,
+                               float pixel_angle, double base, double quadratic,
+                               float* __restrict limit2) {
+  for (int i = 0; i < count; ++i) {
+    const float z = depth[i];
+    const double zd = z;
+    const float sigma = static_cast<float>(base + quadratic * zd * zd);
+    const float limit = tolerance + 2.0f * pixel_angle * z + 2.0f * sigma;
+    limit2[i] = limit * limit;
   }
-  const float dx = cloud.x_W[a] - cloud.x_W[b], dy = cloud.y_W[a] - cloud.y_W[b],
-              dz = cloud.z_W[a] - cloud.z_W[b];
-  return dx * dx + dy * dy + dz * dz < limit_m * limit_m;
+}
+
+/// links |= bit where pixel i and pixel i + step are of one kind and near each other, except where
+/// a bit of `unless` is set.
+POCD_KERNEL void link(const float* __restrict x, const float* __restrict y,
+                      const float* __restrict z, const float* __restrict limit2,
+                      const std::uint32_t* __restrict key, int count, int step, std::int32_t bit,
+                      std::int32_t unless, std::int32_t* __restrict links) {
+  for (int i = 0; i < count; ++i) {
+    const float dx = x[i] - x[i + step], dy = y[i] - y[i + step], dz = z[i] - z[i + step];
+    const float d2 = dx * dx + dy * dy + dz * dz;
+    const std::int32_t near = d2 < limit2[i] ? bit : 0;
+    const std::int32_t alike = key[i] == key[i + step] ? -1 : 0;
+    const std::int32_t object = limit2[i + step] >= 0.0f ? -1 : 0;
+    const std::int32_t free = (links[i] & unless) == 0 ? -1 : 0;
+    links[i] |= near & alike & object & free;
+  }
+}
+
+void find_links(const OrganizedCloud& cloud, const SegmentationConfig& config,
+                const DepthNoise& noise, Memory& memory) {
+  const int width = cloud.width, height = cloud.height;
+  const std::size_t size = cloud.size();
+  memory.key.resize(size);
+  memory.limit2.resize(size);
+  memory.links.assign(size, 0);
+  square_limits(cloud.depth_m.data(), static_cast<int>(size),
+                static_cast<float>(config.cluster_tolerance_m),
+                static_cast<float>(1.0 / cloud.camera.fx), noise.base_m, noise.quadratic_per_m,
+                memory.limit2.data());
+  for (std::size_t i = 0; i < size; ++i) {
+    memory.key[i] = static_cast<std::uint32_t>(cloud.label[i]) << 16 | cloud.instance[i];
+    if (cloud.kind[i] != PixelKind::kObject) memory.limit2[i] = -1.0f;
+  }
+  for (int row = 0; row < height; ++row) {
+    const std::size_t at = static_cast<std::size_t>(row) * width;
+    const auto try_link = [&](int count, int step, std::int32_t bit, std::int32_t unless) {
+      if (count <= 0) return;
+      link(cloud.x_W.data() + at, cloud.y_W.data() + at, cloud.z_W.data() + at,
+           memory.limit2.data() + at, memory.key.data() + at, count, step, bit, unless,
+           memory.links.data() + at);
+    };
+    try_link(width - 1, 1, kRight, 0);
+    try_link(width - 2, 2, kRight2, kRight);
+    if (row + 1 < height) try_link(width, width, kDown, 0);
+    if (row + 2 < height) try_link(width, 2 * width, kDown2, kDown);
+  }
+}
+
+std::int32_t find_root(std::vector<std::int32_t>& parent, std::int32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+/// The root is the smallest index, so labels do not depend on the order of joins.
+void join(std::vector<std::int32_t>& parent, std::int32_t a, std::int32_t b) {
+  if (a == b) return;
+  a = find_root(parent, a), b = find_root(parent, b);
+  parent[std::max(a, b)] = std::min(a, b);
+}
+
+/// Cuts the rows into runs of pixels that are joined to their right neighbours, and joins the runs.
+void join_runs(const OrganizedCloud& cloud, Memory& memory) {
+  const std::int32_t width = cloud.width;
+  const auto size = static_cast<std::int32_t>(cloud.size());
+  memory.run_of.resize(cloud.size());
+  memory.parent.clear();
+  for (std::int32_t i = 0; i < size; ++i) {
+    if (memory.limit2[i] < 0.0f) continue;
+    const bool goes_on = i % width > 0 && (memory.links[i - 1] & kRight);
+    if (!goes_on) memory.parent.push_back(static_cast<std::int32_t>(memory.parent.size()));
+    memory.run_of[i] = static_cast<std::int32_t>(memory.parent.size()) - 1;
+  }
+  for (std::int32_t i = 0; i < size; ++i) {
+    const std::int32_t links = memory.links[i];
+    if ((links & (kRight2 | kDown | kDown2)) == 0) continue;
+    const std::int32_t run = memory.run_of[i];
+    if (links & kRight2) join(memory.parent, run, memory.run_of[i + 2]);
+    if (links & kDown) join(memory.parent, run, memory.run_of[i + width]);
+    if (links & kDown2) join(memory.parent, run, memory.run_of[i + 2 * width]);
+  }
 }
 
 /// Connected components of object pixels, in the order of their first pixel.
 std::vector<Cluster> find_clusters(const OrganizedCloud& cloud, const SegmentationConfig& config,
-                                   const DepthNoise& noise) {
-  const int width = cloud.width, height = cloud.height;
-  DisjointSets sets(cloud.size());
-  const float tolerance = static_cast<float>(config.cluster_tolerance_m);
-  const float pixel_angle = static_cast<float>(1.0 / cloud.camera.fx);
-  for (int row = 0; row < height; ++row) {
-    for (int col = 0; col < width; ++col) {
-      const std::int32_t i = row * width + col;
-      if (cloud.kind[i] != PixelKind::kObject) continue;
-      const float z = cloud.depth_m[i];
-      const float limit =
-          tolerance + 2.0f * pixel_angle * z + 2.0f * static_cast<float>(noise.sigma(z));
-      const auto try_join = [&](std::int32_t j) {
-        const bool joined = connected(cloud, i, j, limit);
-        if (joined) sets.join(i, j);
-        return joined;
-      };
-      if (col + 1 < width && !try_join(i + 1) && col + 2 < width) try_join(i + 2);
-      if (row + 1 < height && !try_join(i + width) && row + 2 < height) try_join(i + 2 * width);
-    }
+                                   const DepthNoise& noise, Memory& memory) {
+  find_links(cloud, config, noise, memory);
+  join_runs(cloud, memory);
+
+  // First only counted: most components are specks that are dropped.
+  std::size_t components = 0;
+  memory.component.resize(memory.parent.size());
+  for (std::size_t run = 0; run < memory.parent.size(); ++run) {
+    const std::int32_t root = find_root(memory.parent, static_cast<std::int32_t>(run));
+    memory.component[run] = static_cast<std::size_t>(root) == run
+                                ? static_cast<std::int32_t>(components++)
+                                : memory.component[root];
   }
-  std::vector<Cluster> clusters;
-  std::vector<std::int32_t> index_of_root(cloud.size(), -1);
+  std::vector<Cluster> all(components);
   const double pixel_area = 1.0 / (cloud.camera.fx * cloud.camera.fy);
-  for (std::int32_t i = 0; i < static_cast<std::int32_t>(cloud.size()); ++i) {
-    if (cloud.kind[i] != PixelKind::kObject) continue;
-    const std::int32_t root = sets.root(i);
-    if (index_of_root[root] < 0) {
-      index_of_root[root] = static_cast<std::int32_t>(clusters.size());
-      clusters.push_back({});
-      clusters.back().root = root;
-      clusters.back().class_id = cloud.label[i];
-      clusters.back().instance = cloud.instance[i];
+  const auto size = static_cast<std::int32_t>(cloud.size());
+  for (std::int32_t i = 0; i < size; ++i) {
+    if (memory.limit2[i] < 0.0f) continue;
+    Cluster& cluster = all[memory.component[memory.run_of[i]]];
+    if (cluster.pixels++ == 0) {
+      cluster.class_id = cloud.label[i];
+      cluster.instance = cloud.instance[i];
     }
-    Cluster& cluster = clusters[index_of_root[root]];
-    ++cluster.pixels;
     const double z = cloud.depth_m[i];
     cluster.area_m2 += z * z * pixel_area;
-    cluster.members.push_back(i);
   }
-  clusters.erase(std::remove_if(clusters.begin(), clusters.end(),
-                                [&](const Cluster& c) {
-                                  return c.pixels < config.min_cluster_pixels ||
-                                         c.area_m2 < config.min_cluster_area_m2;
-                                }),
-                 clusters.end());
+  // Those that stay get new numbers; the others none.
+  std::vector<std::int32_t> kept(components, -1);
+  std::vector<Cluster> clusters;
+  clusters.reserve(static_cast<std::size_t>(size) / config.min_cluster_pixels + 1);
+  for (std::size_t c = 0; c < components; ++c) {
+    if (all[c].pixels < config.min_cluster_pixels || all[c].area_m2 < config.min_cluster_area_m2)
+      continue;
+    kept[c] = static_cast<std::int32_t>(clusters.size());
+    clusters.push_back(std::move(all[c]));
+    if (memory.members.empty()) memory.members.emplace_back();
+    clusters.back().members = std::move(memory.members.back());
+    memory.members.pop_back();
+    clusters.back().members.clear();
+    clusters.back().members.reserve(static_cast<std::size_t>(clusters.back().pixels));
+  }
+  for (std::int32_t i = 0; i < size; ++i) {
+    if (memory.limit2[i] < 0.0f) continue;
+    const std::int32_t c = kept[memory.component[memory.run_of[i]]];
+    if (c >= 0) clusters[c].members.push_back(i);
+  }
   return clusters;
 }
 
 /// Box of about 500 of the cluster's points, evenly by pixel index.
 OrientedBox sample_box(const OrganizedCloud& cloud, const PlaneSegmentation& planes,
-                       const std::vector<std::int32_t>& members) {
-  Points points, normals;
+                       const std::vector<std::int32_t>& members, Memory& memory) {
+  Points &points = memory.box_points, &normals = memory.box_normals;
+  points.clear();
+  normals.clear();
   const std::size_t step = std::max<std::size_t>(1, members.size() / 500);
   for (std::size_t k = 0; k < members.size(); k += step) {
     const std::int32_t i = members[k];
@@ -119,9 +207,9 @@ OrientedBox sample_box(const OrganizedCloud& cloud, const PlaneSegmentation& pla
 /// The published rule: overlapping cuboids are one thing seen in pieces. The larger one's class
 /// wins.
 void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& planes,
-                       double min_size_m, std::vector<Cluster>& clusters) {
+                       double min_size_m, std::vector<Cluster>& clusters, Memory& memory) {
   constexpr double kSameClass = 0.3, kOtherClass = 0.8;
-  for (Cluster& c : clusters) c.box = sample_box(cloud, planes, c.members);
+  for (Cluster& c : clusters) c.box = sample_box(cloud, planes, c.members, memory);
   bool merged = true;
   while (merged) {
     merged = false;
@@ -137,7 +225,8 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
         large.members.insert(large.members.end(), small.members.begin(), small.members.end());
         large.pixels += small.pixels;
         large.area_m2 += small.area_m2;
-        large.box = sample_box(cloud, planes, large.members);
+        large.box = sample_box(cloud, planes, large.members, memory);
+        memory.members.push_back(std::move(small.members));
         clusters.erase(clusters.begin() + (&small - clusters.data()));
         merged = true;
       }
@@ -147,41 +236,40 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
 
 /// Thins a cluster: averages the points of each cell of a grid. Only about four pixels per cell and
 /// axis are looked at, however near the surface is.
-std::vector<SurfacePoint> thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes,
-                               const DepthNoise& noise, double spacing_m, const Cluster& cluster) {
-  struct Sum {
-    Eigen::Vector3f point, normal;
-    float sigma;
-    int count;
-  };
-  std::unordered_map<std::uint64_t, std::size_t> slot_of;
-  std::vector<Sum> sums;
+void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const DepthNoise& noise,
+          double spacing_m, const Cluster& cluster, Memory& memory,
+          std::vector<SurfacePoint>& points) {
+  std::vector<Memory::CellSum>& sums = memory.sums;
+  memory.cells.clear();
+  sums.clear();
   const float inverse = static_cast<float>(1.0 / spacing_m);
   const double pixels_per_spacing = spacing_m * cloud.camera.fx;
   const Eigen::Vector3f eye_W = cloud.T_W_C.translation().cast<float>();
+  // Neighbours mostly fall into one cell.
+  std::uint64_t last_key = 0;
+  std::int32_t last = CellIndex::kNone;
   for (const std::int32_t i : cluster.members) {
     const float z = cloud.depth_m[i];
     const int step = std::max(1, static_cast<int>(pixels_per_spacing / z / 4.0));
     if (step > 1 && ((i % cloud.width) % step != 0 || (i / cloud.width) % step != 0)) continue;
     const Eigen::Vector3f p = cloud.point_W(i);
-    const auto cell = [&](float v) {
-      return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v * inverse)) +
-                                        (1 << 20)) &
-             0x1FFFFF;
-    };
-    const std::uint64_t key = cell(p.x()) | cell(p.y()) << 21 | cell(p.z()) << 42;
-    const auto [it, fresh] = slot_of.try_emplace(key, sums.size());
-    if (fresh) sums.push_back({Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), 0.0f, 0});
-    Sum& sum = sums[it->second];
+    const std::uint64_t key = cell_key(p, inverse);
+    if (last == CellIndex::kNone || key != last_key) {
+      last = memory.cells.insert(key, static_cast<std::int32_t>(sums.size()));
+      last_key = key;
+      if (static_cast<std::size_t>(last) == sums.size())
+        sums.push_back({Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), 0.0f, 0});
+    }
+    Memory::CellSum& sum = sums[last];
     sum.point += p;
     const std::uint16_t plane = planes.plane_of[i];
     if (plane != PlaneSegmentation::kNoPlane) sum.normal += planes.planes[plane].normal_W;
     sum.sigma += static_cast<float>(noise.sigma(z));
     ++sum.count;
   }
-  std::vector<SurfacePoint> points;
+  points.clear();
   points.reserve(sums.size());
-  for (const Sum& sum : sums) {
+  for (const Memory::CellSum& sum : sums) {
     const float count = static_cast<float>(sum.count);
     SurfacePoint point{sum.point / count, Eigen::Vector3f::Zero(), sum.sigma / count};
     const float norm = sum.normal.norm();
@@ -190,7 +278,6 @@ std::vector<SurfacePoint> thin(const OrganizedCloud& cloud, const PlaneSegmentat
     if (point.normal_W.dot(eye_W - point.point_W) < 0.0f) point.normal_W = -point.normal_W;
     points.push_back(point);
   }
-  return points;
 }
 
 /// Hands pixels of the ground band that carry the class of the observation above them to it.
@@ -221,28 +308,31 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config,
 void extract_observations(const SegmentationConfig& config, const DepthNoise& noise,
                           double spacing_m, const PlaneSegmentation& planes, OrganizedCloud& cloud,
                           Observations& out) {
-  std::vector<Cluster> clusters = find_clusters(cloud, config, noise);
-  merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters);
+  static thread_local Memory memory;
+  std::vector<Cluster> clusters = find_clusters(cloud, config, noise, memory);
+  merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters, memory);
   out.list.clear();
   out.observation_of.assign(cloud.size(), Observations::kNone);
-  for (const Cluster& cluster : clusters) {
+  for (Cluster& cluster : clusters) {
     Observation observation;
     observation.class_id = cluster.class_id;
     observation.pixels = cluster.pixels;
     observation.area_m2 = cluster.area_m2;
-    observation.points = thin(cloud, planes, noise, spacing_m, cluster);
-    Points points, normals;
+    thin(cloud, planes, noise, spacing_m, cluster, memory, observation.points);
+    memory.box_points.clear();
+    memory.box_normals.clear();
     for (const SurfacePoint& p : observation.points) {
-      points.push_back(p.point_W);
-      normals.push_back(p.normal_W);
+      memory.box_points.push_back(p.point_W);
+      memory.box_normals.push_back(p.normal_W);
     }
-    observation.box = fit_box(points, normals, 0.01);
+    observation.box = fit_box(memory.box_points, memory.box_normals, 0.01);
     const auto index = static_cast<std::int32_t>(out.list.size());
     for (const std::int32_t i : cluster.members) {
       out.observation_of[i] = index;
       cloud.label[i] = cluster.class_id;
     }
     out.list.push_back(std::move(observation));
+    memory.members.push_back(std::move(cluster.members));
   }
   claim_foot(cloud, config, noise, out);
 }

@@ -66,30 +66,44 @@ void organize(const Frame& frame, int stride, double max_depth_m, const ClassMap
   const int divisor = classes.label_divisor;
   const ClassId default_class = table.canonical(static_cast<ClassId>(classes.default_class));
 
+  // Rays of unit depth, by column and row of the image.
+  std::vector<float> ray_x(frame.camera.width), ray_y(frame.camera.height);
+  for (int u = 0; u < frame.camera.width; ++u) ray_x[u] = (static_cast<float>(u) - cx) / fx;
+  for (int v = 0; v < frame.camera.height; ++v) ray_y[v] = (static_cast<float>(v) - cy) / fy;
+  const PixelKind default_kind = kind_of(table.role(default_class));
+
   pool.parallel_for(cloud.height, 16, [&](std::size_t begin, std::size_t end) {
+    // Masks are patches of one value: the last look-up is nearly always the next one, too.
+    int last_value = -1;
+    ClassId label = default_class;
+    std::uint16_t instance = 0;
+    PixelKind kind = default_kind;
     for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
+      const float* image_row = frame.depth_m.ptr<float>(row * stride);
       for (int col = 0; col < cloud.width; ++col) {
         const std::size_t i = static_cast<std::size_t>(row) * cloud.width + col;
-        const Source source = first_return(frame.depth_m, col, row, stride);
+        Source source{col * stride, row * stride, image_row[col * stride]};
+        if (!(source.depth > 0.0f)) source = first_return(frame.depth_m, col, row, stride);
         cloud.depth_m[i] = source.depth;
-        const Eigen::Vector3f p_C{(static_cast<float>(source.col) - cx) / fx * source.depth,
-                                  (static_cast<float>(source.row) - cy) / fy * source.depth,
-                                  source.depth};
+        const Eigen::Vector3f p_C{ray_x[source.col] * source.depth,
+                                  ray_y[source.row] * source.depth, source.depth};
         const Eigen::Vector3f p_W = R * p_C + t;
         cloud.x_W[i] = p_W.x();
         cloud.y_W[i] = p_W.y();
         cloud.z_W[i] = p_W.z();
-        ClassId label = default_class;
-        std::uint16_t instance = 0;
         if (!frame.labels.empty()) {
           const int value = frame.labels.at<std::uint16_t>(source.row, source.col);
-          label = table.canonical(static_cast<ClassId>(value / divisor));
-          instance = static_cast<std::uint16_t>(value % divisor);
+          if (value != last_value) {
+            last_value = value;
+            label = table.canonical(static_cast<ClassId>(value / divisor));
+            instance = static_cast<std::uint16_t>(value % divisor);
+            kind = kind_of(table.role(label));
+          }
         }
         cloud.label[i] = label;
         cloud.instance[i] = instance;
         const bool usable = source.depth > 0.0f && source.depth <= limit;
-        cloud.kind[i] = usable ? kind_of(table.role(label)) : PixelKind::kNone;
+        cloud.kind[i] = usable ? kind : PixelKind::kNone;
       }
     }
   });

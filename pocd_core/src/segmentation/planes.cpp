@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "pocd/common/kernel.hpp"
+
 namespace pocd {
 namespace {
 
@@ -67,6 +69,32 @@ bool finish(Cell& cell, double tolerance_m, const DepthNoise& noise) {
   return true;
 }
 
+/// Distance to a plane up to which a pixel of that depth lies on it.
+POCD_KERNEL void tolerances(const float* __restrict depth, int count, double tolerance_m,
+                            double base, double quadratic, float* __restrict out) {
+  for (int i = 0; i < count; ++i) {
+    const double z = depth[i];
+    out[i] = static_cast<float>(tolerance_m + 3.0 * (base + quadratic * z * z));
+  }
+}
+
+/// Height of each point above a plane that faces up, and the height up to which it is ground.
+POCD_KERNEL void heights(const float* __restrict x, const float* __restrict y,
+                         const float* __restrict z, const float* __restrict depth, int count,
+                         const float* __restrict normal, float offset, float camera_z, float band,
+                         double base, double quadratic, float* __restrict height,
+                         float* __restrict spread) {
+  const float nx = normal[0], ny = normal[1], nz = normal[2];
+  for (int i = 0; i < count; ++i) {
+    const double d = depth[i];
+    const float sigma = static_cast<float>(base + quadratic * d * d);
+    // Noise acts along the ray; what counts is its vertical part.
+    const float slope = std::abs(z[i] - camera_z) / depth[i];
+    height[i] = nx * x[i] + (ny * y[i] + nz * z[i]) - offset;
+    spread[i] = band + slope * sigma;
+  }
+}
+
 int find_root(std::vector<int>& parent, int i) {
   while (parent[i] != i) i = parent[i] = parent[parent[i]];
   return i;
@@ -81,12 +109,20 @@ void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& confi
   std::vector<Cell> cells(static_cast<std::size_t>(cols) * rows);
   const double fx = cloud.camera.fx, fy = cloud.camera.fy, cx = cloud.camera.cx,
                cy = cloud.camera.cy;
+  std::vector<double> column(cloud.width);
+  for (int col = 0; col < cloud.width; ++col) column[col] = (col - cx) / fx;
   for (int row = 0; row < cloud.height; ++row) {
     const double y = (row - cy) / fy;
-    for (int col = 0; col < cloud.width; ++col) {
-      const std::size_t i = static_cast<std::size_t>(row) * cloud.width + col;
-      if (cloud.kind[i] == PixelKind::kNone) continue;
-      cells[(row / kSide) * cols + col / kSide].fit.add((col - cx) / fx, y, 1.0 / cloud.depth_m[i]);
+    const std::size_t at = static_cast<std::size_t>(row) * cloud.width;
+    for (int first = 0; first < cloud.width; first += kSide) {
+      // In registers for the pixels of one cell in this row.
+      InverseDepthFit fit = cells[(row / kSide) * cols + first / kSide].fit;
+      const int last = std::min(first + kSide, cloud.width);
+      for (int col = first; col < last; ++col) {
+        if (cloud.kind[at + col] == PixelKind::kNone) continue;
+        fit.add(column[col], y, 1.0 / cloud.depth_m[at + col]);
+      }
+      cells[(row / kSide) * cols + first / kSide].fit = fit;
     }
   }
   for (Cell& cell : cells) cell.planar = finish(cell, config.plane_tolerance_m, noise);
@@ -139,29 +175,36 @@ void segment_planes(const OrganizedCloud& cloud, const SegmentationConfig& confi
   }
 
   out.plane_of.assign(cloud.size(), PlaneSegmentation::kNoPlane);
+  std::vector<float> tolerance(cloud.size());
+  tolerances(cloud.depth_m.data(), static_cast<int>(cloud.size()), config.plane_tolerance_m,
+             noise.base_m, noise.quadratic_per_m, tolerance.data());
   for (int row = 0; row < cloud.height; ++row) {
-    for (int col = 0; col < cloud.width; ++col) {
-      const std::size_t i = static_cast<std::size_t>(row) * cloud.width + col;
-      if (cloud.kind[i] == PixelKind::kNone) continue;
-      const int r = row / kSide, c = col / kSide;
+    const int r = row / kSide;
+    for (int c = 0; c < cols; ++c) {
       const std::array<int, 5> near{
           r * cols + c, r > 0 ? (r - 1) * cols + c : -1, r + 1 < rows ? (r + 1) * cols + c : -1,
           c > 0 ? r * cols + c - 1 : -1, c + 1 < cols ? r * cols + c + 1 : -1};
-      const Eigen::Vector3f p_W = cloud.point_W(i);
-      const float tolerance =
-          static_cast<float>(config.plane_tolerance_m + 3.0 * noise.sigma(cloud.depth_m[i]));
-      float best = tolerance;
-      for (const int cell : near) {
-        if (cell < 0 || plane_of_cell[cell] == PlaneSegmentation::kNoPlane) continue;
-        const Plane& plane = out.planes[plane_of_cell[cell]];
-        const float gap = std::abs(plane.normal_W.dot(p_W) - plane.offset_m);
-        if (gap < best) {
-          best = gap;
-          out.plane_of[i] = plane_of_cell[cell];
+      const std::size_t first = static_cast<std::size_t>(row) * cloud.width + c * kSide;
+      const std::size_t last = first + std::min(kSide, cloud.width - c * kSide);
+      for (std::size_t i = first; i < last; ++i) {
+        if (cloud.kind[i] == PixelKind::kNone) continue;
+        const Eigen::Vector3f p_W = cloud.point_W(i);
+        float best = tolerance[i];
+        std::uint16_t best_plane = PlaneSegmentation::kNoPlane;
+        for (const int cell : near) {
+          if (cell < 0 || plane_of_cell[cell] == PlaneSegmentation::kNoPlane) continue;
+          const Plane& plane = out.planes[plane_of_cell[cell]];
+          const float gap = std::abs(plane.normal_W.dot(p_W) - plane.offset_m);
+          if (gap < best) {
+            best = gap;
+            best_plane = plane_of_cell[cell];
+          }
+          if (cell == near[0] && best < tolerance[i]) break;  // its own cell's plane fits
         }
-        if (cell == near[0] && best < tolerance) break;  // its own cell's plane fits
+        if (best_plane == PlaneSegmentation::kNoPlane) continue;
+        out.plane_of[i] = best_plane;
+        ++out.planes[best_plane].pixels;
       }
-      if (out.plane_of[i] != PlaneSegmentation::kNoPlane) ++out.planes[out.plane_of[i]].pixels;
     }
   }
 }
@@ -193,23 +236,30 @@ bool votes(PixelKind kind) {
   return kind == PixelKind::kGround || kind == PixelKind::kBackground || kind == PixelKind::kObject;
 }
 
+ClassCount& count_of(std::vector<ClassCount>& counts, ClassId label, PixelKind kind) {
+  for (ClassCount& c : counts) {
+    if (c.label == label) return c;
+  }
+  counts.push_back({label, kind, 0});
+  return counts.back();
+}
+
 PlaneVotes count_votes(const PlaneSegmentation& planes, const OrganizedCloud& cloud) {
   PlaneVotes result;
   result.counts.resize(planes.planes.size());
   result.voters.resize(planes.planes.size());
+  // Neighbours mostly lie on one plane and carry one class.
+  ClassCount* last = nullptr;
+  std::uint16_t last_plane = PlaneSegmentation::kNoPlane;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const std::uint16_t plane = planes.plane_of[i];
     if (plane == PlaneSegmentation::kNoPlane || !votes(cloud.kind[i])) continue;
     ++result.voters[plane];
-    auto& counts = result.counts[plane];
-    bool found = false;
-    for (ClassCount& c : counts) {
-      if (c.label != cloud.label[i]) continue;
-      ++c.count;
-      found = true;
-      break;
+    if (plane != last_plane || cloud.label[i] != last->label) {
+      last_plane = plane;
+      last = &count_of(result.counts[plane], cloud.label[i], cloud.kind[i]);
     }
-    if (!found) counts.push_back({cloud.label[i], cloud.kind[i], 1});
+    ++last->count;
   }
   return result;
 }
@@ -268,17 +318,17 @@ void GroundModel::update(const PlaneSegmentation& planes, const SegmentationConf
   }
   const float band = static_cast<float>(config.ground_band_m);
   const float ceiling = static_cast<float>(config.max_height_m);
+  if (!known_) return;
+  std::vector<float> height(cloud.size()), spread(cloud.size());
+  heights(cloud.x_W.data(), cloud.y_W.data(), cloud.z_W.data(), cloud.depth_m.data(),
+          static_cast<int>(cloud.size()), normal_W_.data(), offset_m_, camera_z, band, noise.base_m,
+          noise.quadratic_per_m, height.data(), spread.data());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     PixelKind& kind = cloud.kind[i];
     if (!votes(kind)) continue;
-    if (!known_) continue;
-    const float height = normal_W_.dot(cloud.point_W(i)) - offset_m_;
-    // Noise acts along the ray; what counts is its vertical part.
-    const float slope = std::abs(cloud.z_W[i] - camera_z) / cloud.depth_m[i];
-    const float spread = band + slope * static_cast<float>(noise.sigma(cloud.depth_m[i]));
-    if (height < spread) {
+    if (height[i] < spread[i]) {
       kind = PixelKind::kGround;
-    } else if (kind == PixelKind::kGround || (height > ceiling && kind == PixelKind::kObject)) {
+    } else if (kind == PixelKind::kGround || (height[i] > ceiling && kind == PixelKind::kObject)) {
       kind = PixelKind::kBackground;
     }
   }
