@@ -111,21 +111,27 @@ void save_map(const TsdfMap& map, const std::filesystem::path& file) {
     out.write(reinterpret_cast<const char*>(bytes.data()),
               static_cast<std::streamsize>(bytes.size()));
   };
-  write(header_of(map));
-  const std::vector<BlockKey> keys = map.keys_by_region();
-  MapReader reader(map);
-  for (std::size_t begin = 0; begin < keys.size(); begin += kBlocksPerPart) {
-    std::vector<std::uint8_t> raw;
-    raw.reserve(kBlocksPerPart * kBlockSize);
-    for (std::size_t i = begin; i < std::min(keys.size(), begin + kBlocksPerPart); ++i) {
-      put_block(raw, *reader.find(keys[i]));
+  try {
+    write(header_of(map));
+    const std::vector<BlockKey> keys = map.keys_by_region();
+    MapReader reader(map);
+    for (std::size_t begin = 0; begin < keys.size(); begin += kBlocksPerPart) {
+      std::vector<std::uint8_t> raw;
+      raw.reserve(kBlocksPerPart * kBlockSize);
+      for (std::size_t i = begin; i < std::min(keys.size(), begin + kBlocksPerPart); ++i) {
+        put_block(raw, *reader.find(keys[i]));
+      }
+      const std::vector<std::uint8_t> frame = compress(raw, kLevel);
+      std::vector<std::uint8_t> head;
+      put(head, static_cast<std::uint32_t>(frame.size()));
+      put(head, checksum(frame.data(), frame.size()));
+      write(head);
+      write(frame);
     }
-    const std::vector<std::uint8_t> frame = compress(raw, kLevel);
-    std::vector<std::uint8_t> head;
-    put(head, static_cast<std::uint32_t>(frame.size()));
-    put(head, checksum(frame.data(), frame.size()));
-    write(head);
-    write(frame);
+  } catch (const InputError&) {  // a part of the map is on disk, and unreadable
+    out.close();
+    std::filesystem::remove(unfinished);
+    throw;
   }
   out.close();
   std::error_code error;

@@ -81,6 +81,7 @@ TEST(MapMemoryErrors, DamagedPagesCostTheirBlocksOnly) {
   ASSERT_GT(on_disk, 0u);
   ASSERT_EQ(damage_files_in(folder.path().string()), 1);
   EXPECT_THROW(save_map(map, folder / "map"), InputError);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   EXPECT_FALSE(map.take_problem()) << "reading alone loses nothing";
 
   // Back to where everything is on disk. Nothing throws.
