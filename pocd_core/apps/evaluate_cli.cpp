@@ -33,9 +33,12 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
   app.add_option("--run", o.runs, "Scenario file with several visits, as a route of its own")
       ->allow_extra_args(false);
   auto* dataset =
-      app.add_option("--dataset", o.dataset, "Format of recordings: torwic, rgbd")->excludes(names);
+      app.add_option("--dataset", o.dataset, "Format of recordings: torwic, toycar, rgbd")
+          ->excludes(names);
   app.add_option("--input", o.inputs, "Recording; repeat it, the last one is the reference")
       ->needs(dataset)
+      ->allow_extra_args(false);
+  app.add_option("--suite", o.suites, "File that lists such runs, as config/evaluation/beyond.yaml")
       ->allow_extra_args(false);
   app.add_option("--methods", o.methods, "Methods, separated by commas")
       ->delimiter(',')

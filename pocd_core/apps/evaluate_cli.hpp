@@ -11,9 +11,10 @@ namespace pocd {
 struct EvaluateOptions {
   std::filesystem::path scenarios = "config/sim/torwic";
   std::string baseline = "0";
-  std::vector<std::string> names;           ///< empty: every scenario of the folder
-  std::vector<std::filesystem::path> runs;  ///< scenario files with several visits
-  std::string dataset;                      ///< recordings instead: their format
+  std::vector<std::string> names;             ///< empty: every scenario of the folder
+  std::vector<std::filesystem::path> runs;    ///< scenario files with several visits
+  std::vector<std::filesystem::path> suites;  ///< files that list such
+  std::string dataset;                        ///< recordings instead: their format
   std::vector<std::filesystem::path> inputs;
   std::vector<std::string> methods;
   std::vector<std::string> variants;  ///< NAME=FILE or NAME=GROUP.KEY=VALUE,...

@@ -8,8 +8,9 @@
 namespace pocd {
 
 const std::vector<std::string>& method_names() {
-  static const std::vector<std::string> names{"pocd",    "static_tsdf",     "tracked_objects",
-                                              "submaps", "voxel_correction", "tracked_objects_keep"};
+  static const std::vector<std::string> names{
+      "pocd",    "static_tsdf",      "tracked_objects",
+      "submaps", "voxel_correction", "tracked_objects_keep"};
   return names;
 }
 

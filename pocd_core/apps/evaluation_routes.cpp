@@ -104,9 +104,9 @@ std::vector<RunScore> RouteRunner::run(const std::vector<MethodSpec>& methods,
   const auto work = [&] {
     for (std::size_t n = next++; n < jobs_.size(); n = next++) {
       try {
-        scores[n] = evaluate_run(input_of(jobs_[n]), methods, options_.voxels,
-                                 options_.config.map.max_depth_m,
-                                 [&](std::size_t) { progress.frame(); });
+        scores[n] =
+            evaluate_run(input_of(jobs_[n]), methods, options_.voxels,
+                         options_.config.map.max_depth_m, [&](std::size_t) { progress.frame(); });
         progress.run_done(jobs_[n].route->name + " seed " + std::to_string(jobs_[n].seed));
         const std::lock_guard<std::mutex> lock(mutex);
         if (done) done(n, scores[n]);

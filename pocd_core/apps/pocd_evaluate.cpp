@@ -12,6 +12,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Runs that belong together, as a file beside which their paths begin.
+struct Suite {
+  std::vector<std::string> runs;
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("runs", runs, "Scenario files with several visits, relative to this file.");
+  }
+};
+
 std::vector<pocd::Route> list_routes(const pocd::EvaluateOptions& o) {
   if (!o.dataset.empty()) {
     std::string name;
@@ -21,8 +30,16 @@ std::vector<pocd::Route> list_routes(const pocd::EvaluateOptions& o) {
   }
   std::vector<pocd::Route> routes;
   for (const fs::path& file : o.runs) routes.push_back({file.stem().string(), {file}});
+  for (const fs::path& file : o.suites) {
+    Suite suite;
+    pocd::load_config(suite, {file});
+    for (const std::string& run : suite.runs) {
+      const fs::path path = (file.parent_path() / run).lexically_normal();
+      routes.push_back({path.stem().string(), {path}});
+    }
+  }
   std::vector<std::string> names = o.names;
-  if (names.empty() && o.runs.empty()) names = pocd::scenario_names(o.scenarios);
+  if (names.empty() && routes.empty()) names = pocd::scenario_names(o.scenarios);
   for (const std::string& name : names) {
     routes.push_back({o.baseline + "+" + name,
                       {o.scenarios / (o.baseline + ".yaml"), o.scenarios / (name + ".yaml")}});

@@ -37,15 +37,16 @@ double Calibration::expected_error() const {
   return error / static_cast<double>(count());
 }
 
-bool place_is_held(const OrientedBox& box, const std::vector<std::vector<OrientedBox>>& visits) {
+bool place_is_held(const OrientedBox& box, const std::vector<std::vector<OrientedBox>>& visits,
+                   double tolerance_m) {
   double now = 0.0, before = 0.0;
   bool touches = false;
   for (std::size_t v = 0; v < visits.size(); ++v) {
     const bool current = v + 1 == visits.size();
     for (const OrientedBox& place : visits[v]) {
-      const double fit = place_fit(box, place);
+      const double fit = place_fit(box, place, tolerance_m);
       (current ? now : before) = std::max(current ? now : before, fit);
-      touches = touches || (current && same_place(box, place));
+      touches = touches || (current && same_place(box, place, tolerance_m));
     }
   }
   // Things that stayed have the very same box in both visits.

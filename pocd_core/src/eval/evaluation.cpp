@@ -42,7 +42,7 @@ std::vector<std::vector<OrientedBox>> places_until(const SceneTruth& truth, std:
 }
 
 void note(const FrameResult& result, std::size_t frame,
-          const std::vector<std::vector<OrientedBox>>& places, Contestant& c) {
+          const std::vector<std::vector<OrientedBox>>& places, double tolerance_m, Contestant& c) {
   c.score.refused += !result.accepted;
   for (const ObjectEvent& event : result.events) {
     c.run.events.push_back({event, frame});
@@ -55,7 +55,8 @@ void note(const FrameResult& result, std::size_t frame,
   for (const ObjectSnapshot& object : result.changed_objects) {
     c.score.histories[object.id].emplace_back(frame, object.belief.stationarity());
     if (!places.empty()) {
-      c.score.calibration.add(object.belief.stationarity(), place_is_held(object.box, places));
+      c.score.calibration.add(object.belief.stationarity(),
+                              place_is_held(object.box, places, tolerance_m));
     }
   }
 }
@@ -93,7 +94,8 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
       const double before_ms = cpu_ms();
       const FrameResult result = c.route->process(*frame);
       c.cpu_total_ms += cpu_ms() - before_ms;
-      note(result, static_cast<std::size_t>(frame->sequence), places, c);
+      note(result, static_cast<std::size_t>(frame->sequence), places,
+           input.truth ? input.truth->place_tolerance_m : kPlaceTolerance_m, c);
       if (visit == last && c.alone) c.alone->process(*frame);
     }
     last_frames += visit == last;

@@ -10,35 +10,37 @@
 namespace pocd {
 namespace {
 
-bool right_move(const NetChange& net, const TruthChange& change) {
+bool right_move(const NetChange& net, const TruthChange& change, double tolerance_m) {
   if (!net.before || !net.after || !change.before || !change.after) return false;
-  if (!same_place(*net.before, *change.before) || !same_place(*net.after, *change.after))
+  if (!same_place(*net.before, *change.before, tolerance_m) ||
+      !same_place(*net.after, *change.after, tolerance_m)) {
     return false;
+  }
   const Eigen::Vector2d said = (net.after->pose.position_W - net.before->pose.position_W).head<2>();
   const Eigen::Vector2d was =
       (change.after->pose.position_W - change.before->pose.position_W).head<2>();
   // Growth of a partial view moves a box's centre by a few decimetres.
-  return (said - was).norm() <= std::max(0.25, 0.5 * was.norm());
+  return (said - was).norm() <= std::max(2.5 * tolerance_m, 0.5 * was.norm());
 }
 
-bool exact(const NetChange& net, const TruthChange& change) {
+bool exact(const NetChange& net, const TruthChange& change, double tolerance_m) {
   if (net.kind != change.kind) return false;
   switch (change.kind) {
     case ChangeKind::kAdded:
-      return same_place(*net.after, *change.after);
+      return same_place(*net.after, *change.after, tolerance_m);
     case ChangeKind::kRemoved:
-      return same_place(*net.before, *change.before);
+      return same_place(*net.before, *change.before, tolerance_m);
     case ChangeKind::kMoved:
-      return right_move(net, change);
+      return right_move(net, change, tolerance_m);
   }
   return false;
 }
 
-bool says_gone(const NetChange& net, const TruthChange& change) {
-  return net.before && change.before && same_place(*net.before, *change.before);
+bool says_gone(const NetChange& net, const TruthChange& change, double tolerance_m) {
+  return net.before && change.before && same_place(*net.before, *change.before, tolerance_m);
 }
-bool says_new(const NetChange& net, const TruthChange& change) {
-  return net.after && change.after && same_place(*net.after, *change.after);
+bool says_new(const NetChange& net, const TruthChange& change, double tolerance_m) {
+  return net.after && change.after && same_place(*net.after, *change.after, tolerance_m);
 }
 
 /// The net change of one object's events in order.
@@ -89,6 +91,7 @@ class VisitJudge {
   VisitJudge(const RunEvents& run, const SceneTruth& truth, std::size_t visit)
       : run_(run),
         truth_(truth),
+        tolerance_m_(truth.place_tolerance_m),
         visit_(visit),
         begin_(truth.visit_begin[visit]),
         end_(truth.visit_begin[visit + 1]),
@@ -111,9 +114,9 @@ class VisitJudge {
     bool gone = !seen.change.before || !seen.old_place_frame,
          arrived = !seen.change.after || !seen.new_place_frame;
     for (const NetChange& net : nets_) {
-      gone = gone || says_gone(net, seen.change);
-      arrived = arrived || says_new(net, seen.change);
-      if (!exact(net, seen.change)) continue;
+      gone = gone || says_gone(net, seen.change, tolerance_m_);
+      arrived = arrived || says_new(net, seen.change, tolerance_m_);
+      if (!exact(net, seen.change, tolerance_m_)) continue;
       found.exact = true;
       const std::size_t frame = first_said(net.object, seen.change);
       if (!found.exact_frame || frame < *found.exact_frame) found.exact_frame = frame;
@@ -134,7 +137,8 @@ class VisitJudge {
           continue;
         }
         const OrientedBox& place = change.before ? *change.before : *change.after;
-        const bool held = covers(object.box, place), holds = covers(timed.event.box, place);
+        const bool held = covers(object.box, place, tolerance_m_),
+                   holds = covers(timed.event.box, place, tolerance_m_);
         if (change.kind == ChangeKind::kRemoved ? held && !holds : !held && holds) {
           found.exact = true;
           found.exact_frame = timed.frame;
@@ -149,7 +153,7 @@ class VisitJudge {
     const auto events = by_object(run_, begin_, end_).at(id);
     for (std::size_t n = 1; n <= events.size(); ++n) {
       const auto net = net_of({events.begin(), events.begin() + static_cast<std::ptrdiff_t>(n)});
-      if (net && exact(*net, change)) return events[n - 1]->frame;
+      if (net && exact(*net, change, tolerance_m_)) return events[n - 1]->frame;
     }
     return events.back()->frame;
   }
@@ -165,8 +169,9 @@ class VisitJudge {
     bool partial = false;
     for (const SeenChange& seen : truth_.changes) {
       if (seen.visit != visit_) continue;
-      if (exact(net, seen.change)) return NetVerdict::kRight;
-      partial = partial || says_gone(net, seen.change) || says_new(net, seen.change);
+      if (exact(net, seen.change, tolerance_m_)) return NetVerdict::kRight;
+      partial = partial || says_gone(net, seen.change, tolerance_m_) ||
+                says_new(net, seen.change, tolerance_m_);
     }
     if (net.kind == ChangeKind::kRemoved && superseded(net)) return NetVerdict::kNeutral;
     if (partial) return NetVerdict::kPartial;
@@ -178,7 +183,7 @@ class VisitJudge {
   bool superseded(const NetChange& net) const {
     return std::any_of(nets_.begin(), nets_.end(), [&](const NetChange& other) {
       return other.object != net.object && other.kind == ChangeKind::kMoved &&
-             box_overlap(*other.before, *net.before, kMinBoxSize_m) >= 0.8;
+             box_overlap(*other.before, *net.before, tolerance_m_) >= 0.8;
     });
   }
 
@@ -186,17 +191,18 @@ class VisitJudge {
   bool discovery(const NetChange& net) const {
     const auto& things = truth_.objects[visit_];
     const bool there = std::any_of(things.begin(), things.end(), [&](const TruthObject& thing) {
-      return same_place(*net.after, thing.box);
+      return same_place(*net.after, thing.box, tolerance_m_);
     });
     const auto& held = run_.objects_at_visit_begin[visit_];
     const bool known = std::any_of(held.begin(), held.end(), [&](const ObjectSnapshot& object) {
-      return box_overlap(object.box, *net.after, kMinBoxSize_m) >= 0.5;
+      return box_overlap(object.box, *net.after, tolerance_m_) >= 0.5;
     });
     return there && (visit_ == 0 || !known);
   }
 
   const RunEvents& run_;
   const SceneTruth& truth_;
+  double tolerance_m_;
   std::size_t visit_, begin_, end_;
   std::vector<NetChange> nets_;
 };

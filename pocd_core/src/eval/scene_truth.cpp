@@ -11,10 +11,11 @@
 namespace pocd {
 namespace {
 
-constexpr double kSampleSpacing_m = 0.1;
-constexpr double kClearDepth_m = 0.05;  // between a sample and a measured depth
 constexpr int kLeastSamples = 10;
-constexpr double kSeenMargin_m = 0.1;  // two voxels of the map
+// In voxels of the map.
+constexpr double kSampleSpacing = 2.0;
+constexpr double kClearDepth = 1.0;  // between a sample and a measured depth
+constexpr double kSeenMargin = 2.0;
 
 struct Sample {
   Eigen::Vector3d point_W, normal_W;
@@ -22,7 +23,7 @@ struct Sample {
 };
 
 /// Sides and top of a box.
-std::vector<Sample> sample_box(const OrientedBox& box) {
+std::vector<Sample> sample_box(const OrientedBox& box, double spacing_m) {
   std::vector<Sample> samples;
   const Pose T_W_B = upright_pose(box.pose.position_W, box.pose.yaw_rad);
   const Eigen::Vector3d half = box.size_m / 2.0;
@@ -30,8 +31,8 @@ std::vector<Sample> sample_box(const OrientedBox& box) {
     for (const double side : {-1.0, 1.0}) {
       if (axis == 2 && side < 0.0) continue;
       const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-      const int na = std::max(1, static_cast<int>(std::lround(box.size_m[a] / kSampleSpacing_m)));
-      const int nb = std::max(1, static_cast<int>(std::lround(box.size_m[b] / kSampleSpacing_m)));
+      const int na = std::max(1, static_cast<int>(std::lround(box.size_m[a] / spacing_m)));
+      const int nb = std::max(1, static_cast<int>(std::lround(box.size_m[b] / spacing_m)));
       for (int i = 0; i < na; ++i) {
         for (int j = 0; j < nb; ++j) {
           Eigen::Vector3d p, n = Eigen::Vector3d::Zero();
@@ -48,20 +49,21 @@ std::vector<Sample> sample_box(const OrientedBox& box) {
 
 enum class Look { kHit, kThrough };
 
-void look(const Frame& frame, std::size_t number, double max_depth_m, Look what,
+void look(const Frame& frame, std::size_t number, const SceneTruthOptions& options, Look what,
           std::vector<Sample>& samples) {
   const Pose T_C_W = frame.T_W_C.inverse();
+  const double clear_m = kClearDepth * options.map_voxel_m;
   for (Sample& sample : samples) {
     if (sample.first_seen) continue;
     if ((frame.T_W_C.translation() - sample.point_W).dot(sample.normal_W) <= 0.0) continue;
     const Eigen::Vector3d p_C = T_C_W * sample.point_W;
-    if (p_C.z() < 0.05 || p_C.z() > max_depth_m) continue;
+    if (p_C.z() < 0.05 || p_C.z() > options.max_depth_m) continue;
     const double u = p_C.x() / p_C.z() * frame.camera.fx + frame.camera.cx + 0.5;
     const double v = p_C.y() / p_C.z() * frame.camera.fy + frame.camera.cy + 0.5;
     if (u < 0 || v < 0 || u >= frame.camera.width || v >= frame.camera.height) continue;
     const float depth = frame.depth_m.at<float>(static_cast<int>(v), static_cast<int>(u));
-    const bool through = depth == 0.0f || depth > p_C.z() + kClearDepth_m;
-    const bool hit = !through && depth > p_C.z() - kClearDepth_m;
+    const bool through = depth == 0.0f || depth > p_C.z() + clear_m;
+    const bool hit = !through && depth > p_C.z() - clear_m;
     if (what == Look::kHit ? hit : through) sample.first_seen = number;
   }
 }
@@ -121,7 +123,12 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
                        ThreadPool* pool) {
   const std::size_t last = scenario.visits.size() - 1;
   SceneTruth truth{
-      {}, ObservedRegion(options.map_voxel_m, options.max_depth_m, kSeenMargin_m), {}, {}, {}};
+      {},
+      ObservedRegion(options.map_voxel_m, options.max_depth_m, kSeenMargin * options.map_voxel_m),
+      {},
+      {},
+      {},
+      2.0 * options.map_voxel_m};
   const auto final_scene =
       std::make_shared<Scene>(scene_at(scenario, last, std::numeric_limits<double>::infinity()));
   truth.surface.distance_m = [final_scene](const Eigen::Vector3d& p) {
@@ -140,18 +147,20 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
     std::vector<Sample> before, after;
   };
   std::vector<Places> places;
+  const double spacing_m = kSampleSpacing * options.map_voxel_m;
   for (std::size_t visit = 0; visit <= last; ++visit) {
     truth.objects.push_back(objects_after(scenario, visit));
     if (visit == 0) continue;
     for (const TruthChange& change : changes_of(scenario, visit)) {
       truth.changes.push_back({change, visit, std::nullopt, std::nullopt});
-      places.push_back({change.before ? sample_box(*change.before) : std::vector<Sample>(),
-                        change.after ? sample_box(*change.after) : std::vector<Sample>()});
+      places.push_back(
+          {change.before ? sample_box(*change.before, spacing_m) : std::vector<Sample>(),
+           change.after ? sample_box(*change.after, spacing_m) : std::vector<Sample>()});
     }
   }
 
   const SimSchedule schedule(scenario);
-  // A quarter of the resolution: samples are 0.1 m apart, 4 pixels are 2.6 cm at 3 m.
+  // A quarter of the resolution: samples are two voxels apart; at 5 cm and 3 m 4 pixels are 2.6 cm.
   const CameraModel coarse = reduced(scenario.camera, 0.25), half = reduced(scenario.camera, 0.5);
   for (std::size_t i = 0; i < schedule.frames().size(); ++i) {
     const SimFrameTime& when = schedule.frames()[i];
@@ -164,8 +173,8 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
     frame.depth_m = render(scene, coarse, frame.T_W_C, false, pool).depth_m;
     for (std::size_t c = 0; c < truth.changes.size(); ++c) {
       if (truth.changes[c].visit != when.visit) continue;
-      look(frame, i, options.max_depth_m, Look::kThrough, places[c].before);
-      look(frame, i, options.max_depth_m, Look::kHit, places[c].after);
+      look(frame, i, options, Look::kThrough, places[c].before);
+      look(frame, i, options, Look::kHit, places[c].after);
     }
     if (when.visit != last ||
         when.robot_frame % static_cast<std::size_t>(options.frame_stride) != 0)

@@ -184,10 +184,11 @@ class SubmapMethod final : public MappingMethod {
   }
 
   void drop_discarded() {
-    submaps_.erase(
-        std::remove_if(submaps_.begin(), submaps_.end(),
-                       [&](const auto& s) { return !s->active && s->frames < own_.confirm_frames; }),
-        submaps_.end());
+    submaps_.erase(std::remove_if(submaps_.begin(), submaps_.end(),
+                                  [&](const auto& s) {
+                                    return !s->active && s->frames < own_.confirm_frames;
+                                  }),
+                   submaps_.end());
   }
 
   void deactivate() {

@@ -237,6 +237,9 @@ struct SensorFields {
     value = fields.integer(key, value);
     if (value < range.low || value > range.high) out_of(key, range);
   }
+  void operator()(const char* key, std::string& value, const char*) {
+    value = fields.text(key, value);
+  }
   void out_of(const char* key, Range range) {
     fields.fail(
         key, "must be in [" + std::to_string(range.low) + ", " + std::to_string(range.high) + "]");
@@ -254,6 +257,11 @@ SensorModel to_sensor(const YAML::Node& node, const std::string& where) {
   SensorFields visitor{fields};
   model.describe(visitor);
   fields.finish();
+  try {
+    model.blob_classes();
+  } catch (const InputError& error) {
+    throw InputError(where + ": " + error.what());
+  }
   return model;
 }
 

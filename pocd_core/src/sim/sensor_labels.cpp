@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <sstream>
 #include <vector>
 
 #include "hash_noise.hpp"
@@ -42,10 +43,8 @@ void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labe
       const float a = static_cast<float>(u % kCell_px) / kCell_px;
       const cv::Vec2f shift =
           (1 - b) * ((1 - a) * low[0] + a * low[1]) + b * ((1 - a) * high[0] + a * high[1]);
-      const int from_u =
-          std::clamp(u + nearest(shift[0]), 0, labels.cols - 1);
-      const int from_v =
-          std::clamp(v + nearest(shift[1]), 0, labels.rows - 1);
+      const int from_u = std::clamp(u + nearest(shift[0]), 0, labels.cols - 1);
+      const int from_v = std::clamp(v + nearest(shift[1]), 0, labels.rows - 1);
       out[u] = clean.at<std::uint16_t>(from_v, from_u);
     }
   }
@@ -53,9 +52,7 @@ void ragged_borders(const SensorModel& model, const NoiseKey& key, cv::Mat& labe
 
 void wrong_blobs(const SensorModel& model, const NoiseKey& key, int label_divisor,
                  cv::Mat& labels) {
-  // Classes a network confuses things with in a warehouse: static feature, rack, goods, machinery,
-  // cart.
-  constexpr int kWrong[] = {0, 4, 5, 6, 7, 8, 9, 12};
+  const std::vector<int> classes = model.blob_classes();
   Random random(hash_of(key.seed, kBlob, key.robot, key.frame));
   const int count = static_cast<int>(std::floor(model.label_blobs_per_frame + random.uniform()));
   for (int i = 0; i < count; ++i) {
@@ -63,7 +60,7 @@ void wrong_blobs(const SensorModel& model, const NoiseKey& key, int label_diviso
     const int cv = static_cast<int>(random.below(static_cast<std::uint64_t>(labels.rows)));
     const int radius =
         static_cast<int>(std::lround(model.label_blob_radius_px * random.uniform(0.3, 1.0)));
-    const int wrong = kWrong[random.below(8)] * label_divisor;
+    const int wrong = classes[random.below(classes.size())] * label_divisor;
     for (int v = std::max(0, cv - radius); v <= std::min(labels.rows - 1, cv + radius); ++v) {
       for (int u = std::max(0, cu - radius); u <= std::min(labels.cols - 1, cu + radius); ++u) {
         const int du = u - cu, dv = v - cv;
@@ -76,6 +73,25 @@ void wrong_blobs(const SensorModel& model, const NoiseKey& key, int label_diviso
 }
 
 }  // namespace
+
+std::vector<int> SensorModel::blob_classes() const {
+  std::vector<int> classes;
+  std::istringstream text(label_blob_classes);
+  for (std::string word; std::getline(text, word, ',');) {
+    std::size_t used = 0;
+    int value = -1;
+    try {
+      value = std::stoi(word, &used);
+    } catch (const std::exception&) {
+    }
+    if (value < 0 || value > 65535 || word.find_first_not_of(' ', used) != std::string::npos) {
+      throw InputError("label_blob_classes: '" + word + "' is no class");
+    }
+    classes.push_back(value);
+  }
+  if (classes.empty()) throw InputError("label_blob_classes: lists no class");
+  return classes;
+}
 
 void degrade_labels(const SensorModel& model, const NoiseKey& key, int label_divisor,
                     cv::Mat& labels) {

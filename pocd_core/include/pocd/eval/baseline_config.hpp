@@ -1,5 +1,6 @@
-// Thresholds of the methods that the pipeline is compared with. Their defaults are what `pocd_tune`
-// found on scenes and seeds other than those that are reported; docs/evaluation.md has the command.
+// Thresholds of the methods that the pipeline is compared with, chosen by reasoning. `pocd_tune`
+// searches better ones on scenes and seeds other than those that are reported; docs/evaluation.md
+// has the command.
 #pragma once
 
 #include "pocd/config/describe.hpp"

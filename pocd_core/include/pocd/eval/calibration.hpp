@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pocd/common/types.hpp"
+#include "pocd/eval/place_match.hpp"
 
 namespace pocd {
 
@@ -36,6 +37,7 @@ class Calibration {
 /// true things have stood so far, the one that fits its box best (intersection over union) is taken
 /// now. The last element of `visits` are the boxes of this visit. False when no box shares half of
 /// the smaller volume.
-bool place_is_held(const OrientedBox& box, const std::vector<std::vector<OrientedBox>>& visits);
+bool place_is_held(const OrientedBox& box, const std::vector<std::vector<OrientedBox>>& visits,
+                   double tolerance_m = kPlaceTolerance_m);
 
 }  // namespace pocd

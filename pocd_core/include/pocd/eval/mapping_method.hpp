@@ -42,8 +42,8 @@ std::unique_ptr<MappingMethod> make_tracked_objects_method(const PipelineConfig&
                                                            const TrackedObjectsConfig& own = {});
 
 /// Voxel-level correction by new observations, after Fehr et al. (ICRA 2017).
-std::unique_ptr<MappingMethod> make_voxel_correction_method(
-    const PipelineConfig& config, const VoxelCorrectionConfig& own = {});
+std::unique_ptr<MappingMethod> make_voxel_correction_method(const PipelineConfig& config,
+                                                            const VoxelCorrectionConfig& own = {});
 
 /// Object submaps with consistency checks, after Panoptic Multi-TSDFs (Schmid et al., ICRA 2022).
 std::unique_ptr<MappingMethod> make_submap_method(const PipelineConfig& config,

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "pocd/common/thread_pool.hpp"
+#include "pocd/eval/place_match.hpp"
 #include "pocd/eval/voxel_metrics.hpp"
 #include "pocd/sim/truth.hpp"
 
@@ -23,8 +24,8 @@ struct SeenChange {
   TruthChange change;
   std::size_t visit = 1;
   /// First frame by which half of what the visit ever sees through the old place, or sees of the
-  /// object in its new place, has been seen; nothing when that is less than 10 sample points (0.1 m
-  /// grid).
+  /// object in its new place, has been seen; nothing when that is less than 10 sample points (grid
+  /// of two voxels of the map).
   std::optional<std::size_t> old_place_frame, new_place_frame;
 
   /// The frame by which a change can be known: for MOVED the later of the two that there are, since
@@ -40,6 +41,8 @@ struct SceneTruth {
   std::vector<std::vector<TruthObject>> objects;
   /// First frame of each visit, then the number of frames.
   std::vector<std::size_t> visit_begin;
+  /// See place_match.hpp.
+  double place_tolerance_m = kPlaceTolerance_m;
 };
 
 SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& options,

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "pocd/config/describe.hpp"
 #include "pocd/input/frame.hpp"
@@ -25,6 +27,7 @@ struct SensorModel {
   double label_border_px = 2.0;
   double label_blobs_per_frame = 1.0;
   double label_blob_radius_px = 12.0;
+  std::string label_blob_classes = "0,4,5,6,7,8,9,12";
   double alias_share = 0.15;
   int alias_episode_frames = 8;
   int alias_class_a = 4;
@@ -33,6 +36,9 @@ struct SensorModel {
   double rotation_error_deg = 0.3;
   double pose_error_period_s = 8.0;
   double color_noise = 4.0;
+
+  /// Throws InputError for a list that is empty or holds anything but classes.
+  std::vector<int> blob_classes() const;
 
   /// Exact depth, labels and poses; no range limit.
   static SensorModel perfect();
@@ -65,6 +71,8 @@ struct SensorModel {
           "Mean number of round blobs of a wrong class per frame.");
     visit("label_blob_radius_px", label_blob_radius_px, Range{0.0, 200.0},
           "Largest radius of such a blob [px].");
+    visit("label_blob_classes", label_blob_classes,
+          "Classes that such a blob may have, separated by commas.");
     visit("alias_share", alias_share, Range{0.0, 1.0},
           "Share of frames in which class a is labelled as class b throughout.");
     visit("alias_episode_frames", alias_episode_frames, Range{1, 1000},
