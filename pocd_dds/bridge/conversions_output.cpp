@@ -218,6 +218,10 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, std::uint64_
   message.box(box_of(event.box));
   message.has_previous_box(event.previous_box.has_value());
   if (event.previous_box) message.previous_box(box_of(*event.previous_box));
+  if (event.absorbed) {
+    message.absorbed_uuid(object_uuid(epoch, *event.absorbed));
+    message.absorbed_local_id(to_index(*event.absorbed));
+  }
   pocd_msgs::msg::Evidence evidence;
   evidence.delta(event.evidence.delta_m);
   evidence.stationarity_class(static_cast<std::uint8_t>(event.evidence.stationarity_class));
@@ -245,6 +249,8 @@ ObjectEvent event_from(const pocd_msgs::msg::ObjectEvent& message) {
   event.robot = message.robot();
   event.box = box_from(message.box());
   if (message.has_previous_box()) event.previous_box = box_from(message.previous_box());
+  if (message.absorbed_local_id() != 0)
+    event.absorbed = static_cast<ObjectId>(message.absorbed_local_id());
   const auto& evidence = message.evidence();
   event.evidence.delta_m = evidence.delta();
   event.evidence.stationarity_class = evidence.stationarity_class();

@@ -8,9 +8,15 @@
 namespace pocd {
 namespace {
 
-double projective(const Sighting& sighting) {
-  if (sighting.differences_m.empty()) return 0.0;
-  std::vector<float> values = sighting.differences_m;
+/// Median over the points that both views hold: the published measure also counts only voxels that
+/// are within the truncation of both surfaces. Points that are seen through altogether tell whether
+/// the object is there, not how far it moved.
+double projective(const Sighting& sighting, double band_m) {
+  std::vector<float> values;
+  for (const float d : sighting.differences_m) {
+    if (std::abs(d) <= band_m) values.push_back(d);
+  }
+  if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return -static_cast<double>(*middle);
@@ -34,7 +40,8 @@ double geometric_change(const LibraryObject& object, const Observation& observat
     const auto change = ray_traced_change(object_C, observation_C, -match.sign, options);
     delta_m = change ? change->delta_m : match.sign * match.displacement_m;
   } else {
-    delta_m = match.stationary ? projective(sighting) : match.sign * match.displacement_m;
+    delta_m =
+        match.stationary ? projective(sighting, config.tau_m) : match.sign * match.displacement_m;
   }
   return std::clamp(delta_m, -config.delta_max_m, config.delta_max_m);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "pocd/eval/place_match.hpp"
 #include "pocd/segmentation/observations.hpp"
@@ -223,7 +224,13 @@ double harmonic(double p, double r) {
 std::vector<NetChange> net_changes(const RunEvents& run, std::size_t first_frame,
                                    std::size_t end_frame) {
   std::vector<NetChange> nets;
+  std::set<ObjectId> absorbed;
+  for (const RunEvents::Timed& timed : run.events) {
+    if (timed.frame >= first_frame && timed.frame < end_frame && timed.event.absorbed)
+      absorbed.insert(*timed.event.absorbed);
+  }
   for (const auto& [id, events] : by_object(run, first_frame, end_frame)) {
+    if (absorbed.count(id) > 0) continue;  // its events went on under another id
     if (const auto net = net_of(events)) nets.push_back(*net);
   }
   return nets;

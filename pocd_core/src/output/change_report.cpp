@@ -79,6 +79,22 @@ class Unclaimed {
   double radius_m_;
 };
 
+/// What the events say in the end: without an ADDED or REMOVED that a later MOVED takes back.
+std::vector<ReportedEvent> settled(const std::vector<ReportedEvent>& events) {
+  std::vector<ReportedEvent> kept;
+  for (const ReportedEvent& event : events) {
+    const auto taken_back = [&](const ReportedEvent& earlier) {
+      const bool same_thing = event.absorbed && earlier.object == *event.absorbed;
+      return (earlier.kind == EventKind::kAdded && same_thing) ||
+             (earlier.kind == EventKind::kRemoved && event.kind == EventKind::kMoved &&
+              earlier.object == event.object);
+    };
+    kept.erase(std::remove_if(kept.begin(), kept.end(), taken_back), kept.end());
+    kept.push_back(event);
+  }
+  return kept;
+}
+
 struct Truth {
   std::string visit;
   TruthChange change;
@@ -114,7 +130,8 @@ std::string describe(const TruthChange& change) {
 ChangeReport compare_changes(const Scenario& scenario, const std::vector<ReportedEvent>& events,
                              double radius_m) {
   const std::vector<Truth> truths = truths_of(scenario);
-  Unclaimed unclaimed(events, radius_m);
+  const std::vector<ReportedEvent> last_word = settled(events);
+  Unclaimed unclaimed(last_word, radius_m);
   ChangeReport report;
   for (const Truth& truth : truths) {
     ChangeRow row{truth.visit, describe(truth.change), "", false};

@@ -89,6 +89,8 @@ std::vector<ReportedEvent> read_events_csv(const std::filesystem::path& file) {
     event.class_name = row.text("class_name");
     event.position_W = row.position("");
     if (!row.text("previous_x").empty()) event.previous_W = row.position("previous_");
+    if (!row.text("absorbed").empty())
+      event.absorbed = static_cast<std::uint32_t>(row.number("absorbed"));
     events.push_back(event);
   }
   return events;

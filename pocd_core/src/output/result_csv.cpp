@@ -52,11 +52,13 @@ Cells belief_cells(const Belief& belief) {
 }
 
 constexpr const char* kObjectsHeader =
-    "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,box_z,stationarity,alpha,beta,"
+    "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,box_z,stationarity,"
+    "alpha,beta,"
     "mu,sigma,first_seen_ns,last_seen_ns,observations,last_robot";
 constexpr const char* kEventsHeader =
     "sequence,stamp_ns,kind,object_id,class,class_name,robot,frame,x,y,z,yaw,size_x,size_y,size_z,"
-    "previous_x,previous_y,previous_z,previous_yaw,rule,delta,measured_stationarity_class,k,c1,c2,"
+    "previous_x,previous_y,previous_z,previous_yaw,absorbed,rule,delta,measured_stationarity_class,"
+    "k,c1,c2,"
     "visible_share,seen_through_share,measurement_sigma,stationarity_before,alpha_before,"
     "beta_before,mu_before,sigma_before,stationarity_after,alpha_after,beta_after,mu_after,"
     "sigma_after";
@@ -86,9 +88,10 @@ void write_objects_csv(const std::vector<ObjectSnapshot>& objects, const ClassNa
     Cells cells{std::to_string(to_index(object.id)), std::to_string(object.class_id),
                 class_name(object.class_id), std::to_string(object.stationarity_class)};
     const Pose4 pose = object.pose();
-    append(cells, {length(pose.position_W.x()), length(pose.position_W.y()), length(pose.position_W.z()),
-                   length(pose.yaw_rad), length(object.box.size_m.x()), length(object.box.size_m.y()),
-                   length(object.box.size_m.z()), length(object.box.pose.position_W.z())});
+    append(cells,
+           {length(pose.position_W.x()), length(pose.position_W.y()), length(pose.position_W.z()),
+            length(pose.yaw_rad), length(object.box.size_m.x()), length(object.box.size_m.y()),
+            length(object.box.size_m.z()), length(object.box.pose.position_W.z())});
     append(cells, belief_cells(object.belief));
     append(cells, {std::to_string(object.first_seen_ns), std::to_string(object.last_seen_ns),
                    std::to_string(object.observations), object.last_robot});
@@ -116,10 +119,11 @@ void EventsCsv::add(const ObjectEvent& event, const std::string& class_name) {
     previous.resize(4);
   }
   append(cells, previous);
-  append(cells, {evidence.rule, number(evidence.delta_m),
-                 std::to_string(evidence.stationarity_class), number(evidence.k),
-                 number(evidence.c1), number(evidence.c2), number(evidence.visible_share),
-                 number(evidence.seen_through_share), number(evidence.measurement_sigma_m)});
+  append(cells,
+         {event.absorbed ? std::to_string(to_index(*event.absorbed)) : "", evidence.rule,
+          number(evidence.delta_m), std::to_string(evidence.stationarity_class), number(evidence.k),
+          number(evidence.c1), number(evidence.c2), number(evidence.visible_share),
+          number(evidence.seen_through_share), number(evidence.measurement_sigma_m)});
   append(cells, belief_cells(evidence.before));
   append(cells, belief_cells(evidence.after));
   file_.row(cells);

@@ -19,6 +19,14 @@ constexpr int kDisplacedFrames = 3;
 /// An observation that adds at least this share of points shows that the object is not seen whole
 /// yet.
 constexpr double kGrowingShare = 0.03;
+/// Seen in its place: at least so many points and this share of those in view are measured there.
+/// Above the share that a thing keeps when it slides along itself by a third.
+constexpr int kPresentPoints = 30;
+constexpr double kPresentShare = 0.8;
+/// An outline that is cut off by more than this share belongs to something that is not seen whole.
+constexpr double kCutShare = 0.1;
+/// Its place is in question when this share of the points in view is seen through or covered.
+constexpr double kContestedShare = 0.25;
 
 }  // namespace
 
@@ -32,13 +40,16 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
   find_candidates(step);
   step.association = associate(candidates_.data(), step.candidate_count, observations, cloud.T_W_C,
                                config_.association);
+  note_presence(step);
   update_matched(step);
   update_unmatched(step);
   erode(step);
   add_new(step);
   join_companions(step);
   remove_or_confirm(step);
+  link_additions(step);
   report_changes(step);
+  views_.add(cloud, frame.stamp_ns);
 }
 
 void ObjectTracker::find_candidates(Step& step) {
@@ -64,6 +75,29 @@ void ObjectTracker::find_candidates(Step& step) {
   }
 }
 
+void ObjectTracker::note_presence(Step& step) {
+  for (std::size_t c = 0; c < step.candidate_count; ++c) {
+    LibraryObject& object = *candidates_[c].object;
+    const Sighting& s = candidates_[c].sighting;
+    const int in_view = s.hit + s.seen_through + s.occluded + s.unknown;
+    int covered = 0;
+    for (const auto& touch : s.touches) {
+      if (step.observations.list[touch.observation].class_id == object.class_id)
+        covered += touch.in_front;
+    }
+    // Points where masks show another class do not show this object.
+    const int own = s.hit - s.hit_other_class;
+    if (!step.association.doubtful[c] && own >= kPresentPoints && own >= kPresentShare * in_view) {
+      object.verified_ns = step.frame.stamp_ns;
+    } else if (step.association.doubtful[c] ||
+               s.seen_through + covered + s.hit_other_class > kContestedShare * in_view) {
+      if (object.contested_since_ns <= object.verified_ns)
+        object.contested_since_ns = step.frame.stamp_ns;
+      object.contested_ns = step.frame.stamp_ns;
+    }
+  }
+}
+
 void ObjectTracker::update_matched(Step& step) {
   const double verified_m = 0.5 * config_.change.tau_m;
   for (const Match& match : step.association.matches) {
@@ -74,6 +108,13 @@ void ObjectTracker::update_matched(Step& step) {
     ++object.frames_in_view;
     if (config_.association.realign_displaced && match.stationary && object.confirmed &&
         shift_object(step, object, match, sighting)) {
+      continue;
+    }
+    // A few points at an edge say nothing about the whole.
+    if (match.stationary && sighting.visible() < kPresentPoints &&
+        sighting.visible_share() < config_.association.min_visible_share) {
+      fuse(step, object, match.observation);
+      step.owner_of_observation[match.observation] = to_index(object.id);
       continue;
     }
     const double delta_m =
@@ -182,6 +223,7 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) 
   const int added = object.model.fuse(observation.points);
   object.gained += static_cast<std::size_t>(added);
   object.growing = added > kGrowingShare * static_cast<double>(object.model.surfels().size());
+  object.cut = observation.cut_share > kCutShare;
   object.icp_target.reset();
   ++object.observations;
   object.last_seen_ns = step.frame.stamp_ns;

@@ -6,6 +6,7 @@
 
 #include "pocd/association/associate.hpp"
 #include "pocd/map/tsdf_map.hpp"
+#include "pocd/map/view_memory.hpp"
 #include "pocd/pipeline/frame_result.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/segmentation/planes.hpp"
@@ -31,6 +32,8 @@ class ObjectTracker {
   struct Step;  ///< what the parts of one update share
 
   void find_candidates(Step& step);
+  /// Notes which objects were seen in their place, and whose place was seen empty or covered.
+  void note_presence(Step& step);
   void update_matched(Step& step);
   void update_unmatched(Step& step);
   void add_new(Step& step);
@@ -48,21 +51,56 @@ class ObjectTracker {
   void refit_box(Step& step, LibraryObject& object);
   /// Makes a new object the continuation of a known one: id, voxels, history.
   void take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns);
-  /// The tentative object in view that is most likely this one, moved; or null.
+  /// Where a new object may have come from: the nearest place of a like object that was removed, or
+  /// that was not seen in its place since the new one turned up.
+  struct Origin {
+    const RelocationMemory::Removed* removed = nullptr;  ///< valid until the next call
+    LibraryObject* live = nullptr;
+    double distance_m = 0.0;
+  };
+  std::optional<Origin> origin_of(const Step& step, LibraryObject& found);
+  /// A new object (tentative or reported as ADDED) whose origin is this one; or null.
   LibraryObject* new_place_of(const Step& step, const LibraryObject& object);
-  /// A known object of this class and size that was added since this one was last seen, or null.
-  LibraryObject* added_like(const Step& step, const LibraryObject& object);
-  /// What was removed and looks like this object, or null.
-  const RelocationMemory::Removed* removed_like(const Step& step, const LibraryObject& object);
+  /// The known object, seen in its place, that a new one is a part of because they would overlap;
+  /// or null.
+  LibraryObject* part_of(const Step& step, const LibraryObject& found);
+  /// An object that moved and is not seen whole since, of which a new one beside it is the rest:
+  /// the two fit into the size that it had; or null.
+  LibraryObject* completed_by(const LibraryObject& found);
+  /// A like object in question whose place a new one takes, so that it moved there; or null.
+  LibraryObject* displaced_by(const Step& step, const LibraryObject& found);
+  /// Whether a new one is seen only in part, beside a like one that may have moved.
+  bool may_be_part(const LibraryObject& found) const;
+  /// Tries to explain a new object by what is known: as a part of it, or as what moved into the
+  /// place of something. True when that was done; `found` may be gone then.
+  bool explain(Step& step, LibraryObject& found);
+  /// Joins new objects that are the rest of one that moved and is seen better now.
+  void take_rest(Step& step, LibraryObject& moved);
+  /// Makes `absorbed` a part of `survivor`.
+  void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
+  /// What was reported as ADDED turns out, seen better, to be a known thing that moved.
+  void link_additions(Step& step);
+  /// Whether the place of an object was seen empty before the object was seen there.
+  bool has_arrived(LibraryObject& object) const;
+  /// A known object that grew at one end into what was empty before, while the other end was seen
+  /// through, slid along itself: true after its model has been cut to its size.
+  bool slide(Step& step, LibraryObject& object);
+  /// Whether the box differs from the last report by more than noise.
+  bool notable_change(const LibraryObject& object) const;
+  /// Makes `found` the continuation of a removed object, and reports it as MOVED.
+  void report_move(Step& step, LibraryObject& found, const RelocationMemory::Removed& origin,
+                   const std::string& rule);
   /// Whether a new object may be a known one elsewhere, by its size.
-  bool may_be(const LibraryObject& found, const LibraryObject& known) const;
-  /// Whether another known object, not seen in its place lately, was nearer to where this one was
-  /// found.
-  bool has_nearer_claim(const Step& step, const LibraryObject& found, ObjectId claimant,
-                        const OrientedBox& old_place) const;
+  bool may_be(const LibraryObject& found, const OrientedBox& known) const;
+  /// Whether a thing found here and the known one would overlap, so that the known one is not there
+  /// any more.
+  bool takes_place_of(const Step& step, const LibraryObject& found,
+                      const LibraryObject& known) const;
   void mark_changed(LibraryObject& object);
   void confirm(Step& step, LibraryObject& object);
-  void remove(Step& step, ObjectId id, const std::string& rule);
+  /// Takes the object out of library and map. It is reported as MOVED when there is a successor:
+  /// the given one, or what new_place_of finds.
+  void remove(Step& step, ObjectId id, const std::string& rule, LibraryObject* successor = nullptr);
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
                          const std::string& rule);
   double like_size_slack_m() const { return 3.0 * config_.map.voxel_size_m; }
@@ -70,6 +108,7 @@ class ObjectTracker {
   PipelineConfig config_;
   ObjectLibrary library_;
   RelocationMemory relocations_;
+  ViewMemory views_;
   std::uint64_t next_event_ = 1;
   std::vector<Candidate>
       candidates_;                 ///< a frame uses the first ones; memory is kept between frames

@@ -1,6 +1,8 @@
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
 #include <chrono>
+#include <set>
+#include <string>
 
 #include "object_tracker.hpp"
 #include "pocd/common/check.hpp"
@@ -43,6 +45,7 @@ struct PocdPipeline::Impl {
   GroundModel ground;
   ObjectTracker tracker;
   TsdfMap map;
+  std::set<std::string> robots_with_masks;
   // Memory of a frame, kept between frames.
   OrganizedCloud cloud;
   PlaneSegmentation planes;
@@ -50,6 +53,13 @@ struct PocdPipeline::Impl {
   DepthField field;
   std::vector<std::uint32_t> owner_of_observation;
   std::vector<std::uint32_t> owners;
+  bool mask_missing = false;
+
+  /// Whether a robot that delivers masks did not this time.
+  bool mask_is_missing(const Frame& frame) {
+    if (!frame.labels.empty()) robots_with_masks.insert(frame.robot);
+    return frame.labels.empty() && robots_with_masks.count(frame.robot) > 0;
+  }
 
   void paint_owners();
   void integrate(const Frame& frame);
@@ -90,8 +100,17 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   vote_planes(p.planes, segmentation.majority_share, p.cloud);
   p.ground.update(p.planes, segmentation, noise, p.cloud);
   clock.done("clean");
-  extract_observations(segmentation, noise, p.config.map.voxel_size_m, p.planes, p.cloud,
-                       p.observations);
+  p.mask_missing = p.mask_is_missing(frame);
+  if (p.mask_missing) {
+    // What things are would be a guess: they may be seen to be gone, but nothing is learnt of them.
+    p.observations.list.clear();
+    p.observations.observation_of.assign(p.cloud.size(), Observations::kNone);
+    result.warnings.push_back((frame.robot.empty() ? "" : frame.robot + ": ") +
+                              "no segmentation image: nothing is added, matched or mapped");
+  } else {
+    extract_observations(segmentation, noise, p.config.map.voxel_size_m, p.planes, p.cloud,
+                         p.observations);
+  }
   clock.done("cluster");
   p.field.update(p.cloud);
   p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation,
@@ -107,7 +126,8 @@ void PocdPipeline::Impl::paint_owners() {
   owners.resize(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const std::int32_t observation = observations.observation_of[i];
-    if (cloud.kind[i] == PixelKind::kDynamic || cloud.kind[i] == PixelKind::kIgnore) {
+    if (mask_missing || cloud.kind[i] == PixelKind::kDynamic ||
+        cloud.kind[i] == PixelKind::kIgnore) {
       owners[i] = IntegrationInput::kSkip;
     } else {
       owners[i] = observation == Observations::kNone ? 0 : owner_of_observation[observation];

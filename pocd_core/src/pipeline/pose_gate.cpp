@@ -4,6 +4,12 @@
 #include <cstdio>
 
 namespace pocd {
+namespace {
+
+/// A camera's velocity says where it is for so long.
+constexpr double kVelocityHolds_s = 0.7;
+
+}  // namespace
 
 bool PoseGate::plausible(const Pose& from, StampNs from_ns, const Pose& to, StampNs to_ns,
                          double& jump_m, double& turn_deg) const {
@@ -15,12 +21,41 @@ bool PoseGate::plausible(const Pose& from, StampNs from_ns, const Pose& to, Stam
          turn_deg <= config_.slack_deg + config_.max_turn_dps * seconds;
 }
 
+bool PoseGate::on_its_way(const Track& track, const Pose& pose, StampNs stamp_ns) const {
+  const double seconds = static_cast<double>(stamp_ns - track.accepted_ns) * 1e-9;
+  if (!track.velocity_mps || seconds <= 0.0 || seconds > kVelocityHolds_s) return true;
+  const auto error_m = [&](const Pose& from, StampNs from_ns) {
+    const double s = static_cast<double>(stamp_ns - from_ns) * 1e-9;
+    return (pose.translation() - from.translation() - s * *track.velocity_mps).norm();
+  };
+  const double off_m = error_m(track.accepted, track.accepted_ns);
+  // During a jump: still with the refused poses, or back on the way?
+  if (track.refused_in_a_row > 0 && error_m(track.refused, track.refused_ns) < off_m) return false;
+  return off_m <=
+         config_.slack_m + 0.5 * config_.max_acceleration_mps2 * seconds * (seconds + track.step_s);
+}
+
+void PoseGate::accept(Track& track, const Pose& pose, StampNs stamp_ns) const {
+  const double seconds = static_cast<double>(stamp_ns - track.accepted_ns) * 1e-9;
+  track.velocity_mps.reset();
+  // After refused frames the speed is that of the jump.
+  if (track.accepted_ns > 0 && seconds > 0.0 && seconds <= kVelocityHolds_s &&
+      track.refused_in_a_row <= config_.accept_after_frames) {
+    track.velocity_mps = (pose.translation() - track.accepted.translation()) / seconds;
+    track.step_s = seconds;
+  }
+  track.accepted = pose;
+  track.accepted_ns = stamp_ns;
+  track.refused_in_a_row = 0;
+}
+
 std::optional<std::string> PoseGate::refuse(const Frame& frame) {
   const auto [it, fresh] = tracks_.try_emplace(frame.robot);
   Track& track = it->second;
   double jump_m = 0.0, turn_deg = 0.0;
-  bool ok = fresh || plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,
-                               jump_m, turn_deg);
+  bool ok = fresh || (plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,
+                                jump_m, turn_deg) &&
+                      on_its_way(track, frame.T_W_C, frame.stamp_ns));
   if (!ok) {
     double step_m = 0.0, step_deg = 0.0;
     const bool agrees =
@@ -32,9 +67,7 @@ std::optional<std::string> PoseGate::refuse(const Frame& frame) {
     ok = track.refused_in_a_row > config_.accept_after_frames;
   }
   if (ok) {
-    track.accepted = frame.T_W_C;
-    track.accepted_ns = frame.stamp_ns;
-    track.refused_in_a_row = 0;
+    accept(track, frame.T_W_C, frame.stamp_ns);
     return std::nullopt;
   }
   char text[160];

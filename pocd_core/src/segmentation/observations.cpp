@@ -303,6 +303,40 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config,
   }
 }
 
+/// Outlines of the observations: where each is cut off.
+void find_cuts(const OrganizedCloud& cloud, const DepthNoise& noise, double spacing_m,
+               Observations& out) {
+  std::vector<int> outline(out.list.size(), 0), cut(out.list.size(), 0);
+  const auto look = [&](std::int32_t i, std::int32_t j) {
+    const std::int32_t owner = out.observation_of[i];
+    if (j >= 0 && out.observation_of[j] == owner) return;
+    ++outline[owner];
+    if (j < 0) {
+      ++cut[owner];
+      return;
+    }
+    const float z = cloud.depth_m[i], next = cloud.depth_m[j];
+    const float step = static_cast<float>(spacing_m + 3.0 * noise.sigma(z));
+    if (next <= 0.0f) {
+      --outline[owner];  // a hole tells nothing
+    } else if (next < z - step || (cloud.kind[j] == PixelKind::kNone && next < z + step)) {
+      ++cut[owner];
+    }
+  };
+  for (std::int32_t row = 0; row < cloud.height; ++row) {
+    for (std::int32_t col = 0; col < cloud.width; ++col) {
+      const std::int32_t i = row * cloud.width + col;
+      if (out.observation_of[i] == Observations::kNone) continue;
+      look(i, col > 0 ? i - 1 : -1);
+      look(i, col + 1 < cloud.width ? i + 1 : -1);
+      look(i, row > 0 ? i - cloud.width : -1);
+    }
+  }
+  for (std::size_t k = 0; k < out.list.size(); ++k) {
+    if (outline[k] > 0) out.list[k].cut_share = static_cast<double>(cut[k]) / outline[k];
+  }
+}
+
 }  // namespace
 
 void extract_observations(const SegmentationConfig& config, const DepthNoise& noise,
@@ -335,6 +369,7 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
     memory.members.push_back(std::move(cluster.members));
   }
   claim_foot(cloud, config, noise, out);
+  find_cuts(cloud, noise, spacing_m, out);
 }
 
 }  // namespace pocd

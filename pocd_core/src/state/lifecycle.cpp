@@ -87,24 +87,61 @@ bool fits_inside(const OrientedBox& part, const OrientedBox& whole, double slack
   return true;
 }
 
-const RelocationMemory::Removed* RelocationMemory::find(ClassId class_id, const OrientedBox& box,
-                                                        StampNs now_ns, double window_s,
-                                                        double reach_m, double slack_m) {
+bool same_side(const OrientedBox& part, const OrientedBox& whole, double slack_m) {
+  const Eigen::Vector3d p = sorted_size(part), w = sorted_size(whole);
+  const auto same = [&](double a, double b) {
+    return std::abs(a - b) <= std::max(slack_m, 0.2 * std::max(a, b));
+  };
+  return same(p[2], w[2]) && (same(p[0], w[0]) || same(p[0], w[1]));
+}
+
+OrientedBox filled(const OrientedBox& box, const Eigen::Vector3d& eye_W, double least_m) {
+  OrientedBox result = box;
+  const Eigen::Vector3d away_W = box.pose.position_W - eye_W;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double missing = least_m - box.size_m[axis];
+    if (missing <= 0.0) continue;
+    const double yaw = box.pose.yaw_rad + (axis == 0 ? 0.0 : 0.5 * M_PI);
+    Eigen::Vector3d direction_W(std::cos(yaw), std::sin(yaw), 0.0);
+    if (direction_W.dot(away_W) < 0.0) direction_W = -direction_W;
+    result.pose.position_W += 0.5 * missing * direction_W;
+    result.size_m[axis] = least_m;
+  }
+  return result;
+}
+
+OrientedBox completed_box(const OrientedBox& part, const OrientedBox& known,
+                          const Eigen::Vector3d& eye_W, double least_m) {
+  // Sizes of the known box along the axes of the part.
+  const double turn = std::cos(part.pose.yaw_rad - known.pose.yaw_rad);
+  const bool swapped = std::abs(turn) < M_SQRT1_2;
+  OrientedBox box = part;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double yaw = part.pose.yaw_rad + (axis == 0 ? 0.0 : 0.5 * M_PI);
+    const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
+    const double whole_m = std::max(known.size_m[swapped ? 1 - axis : axis], part.size_m[axis]);
+    const double slack_m = 0.5 * (whole_m - part.size_m[axis]);
+    const double eye_m = (eye_W - part.pose.position_W).dot(along_W);
+    const bool depth = part.size_m[axis] < least_m && std::abs(eye_m) > 0.5 * part.size_m[axis] &&
+                       part.size_m[axis] < part.size_m[1 - axis];
+    const double old_m = (known.pose.position_W - part.pose.position_W).dot(along_W);
+    const double move_m =
+        depth ? (eye_m > 0.0 ? -slack_m : slack_m) : std::clamp(old_m, -slack_m, slack_m);
+    box.pose.position_W += move_m * along_W;
+    box.size_m[axis] = whole_m;
+  }
+  const double bottom_m = part.pose.position_W.z() - 0.5 * part.size_m.z();
+  box.size_m.z() = std::max(part.size_m.z(), known.size_m.z());
+  box.pose.position_W.z() = bottom_m + 0.5 * box.size_m.z();
+  return box;
+}
+
+const std::deque<RelocationMemory::Removed>& RelocationMemory::recent(StampNs now_ns,
+                                                                      double window_s) {
   const auto window_ns = static_cast<StampNs>(window_s * 1e9);
   while (!removed_.empty() && now_ns - removed_.front().removed_ns > window_ns)
     removed_.pop_front();
-  const Removed* best = nullptr;
-  double best_distance = 0.0;
-  for (const Removed& removed : removed_) {
-    if (removed.class_id != class_id) continue;
-    const double distance = (removed.box.pose.position_W - box.pose.position_W).head<2>().norm();
-    if (!alike(removed.box, box, slack_m) &&
-        !(distance <= reach_m && fits_inside(box, removed.box, slack_m))) {
-      continue;
-    }
-    if (!best || distance < best_distance) best = &removed, best_distance = distance;
-  }
-  return best;
+  return removed_;
 }
 
 void RelocationMemory::forget(ObjectId id) {

@@ -82,11 +82,15 @@ TEST(PipelineNoChange, MissingMasksRemoveNothing) {
   for (int i = 0; i < 25; ++i) {
     Frame frame = drive.next_frame(furnished());
     frame.labels = cv::Mat();
-    drive.process(frame);
+    const FrameResult result = drive.process(frame);
+    ASSERT_EQ(result.warnings.size(), 1u) << "it is named";
+    EXPECT_NE(result.warnings[0].find("no segmentation image"), std::string::npos);
   }
+  EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << "nothing is made of the default class";
   expect_nothing_removed_or_moved(drive);
   drive.watch(furnished(), 25);
   expect_nothing_removed_or_moved(drive);
+  EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << text(drive.events());
   const auto after = drive.pipeline().objects();
   ASSERT_EQ(after.size(), 2u) << text(drive.events());
   for (std::size_t i = 0; i < 2; ++i) {

@@ -78,6 +78,30 @@ TEST_F(PoseGateTest, GoodPosesBetweenJumpsRestartTheCount) {
     EXPECT_EQ(show(i, i % 10 ? 40.0 : 0.0).has_value(), i % 10 != 0) << i;
 }
 
+TEST_F(PoseGateTest, JumpTooShortForTheSpeedIsOffTheWay) {
+  // 0.3 m aside for six frames, whatever the direction: each is refused, and the way goes on.
+  for (const double jump_m : {0.3, -0.3}) {
+    PoseGate gate(config_);
+    for (int i = 0; i < 40; ++i) {
+      Frame frame;
+      frame.stamp_ns = 1'000'000'000 + i * kPeriod_ns;
+      const bool jumps = i >= 20 && i < 26;
+      frame.T_W_C.translation().x() = 0.05 * i + (jumps ? jump_m : 0.0);
+      EXPECT_EQ(gate.refuse(frame).has_value(), jumps) << i << " by " << jump_m;
+    }
+  }
+}
+
+TEST_F(PoseGateTest, StartsStopsAndTurnsAreOnTheWay) {
+  // From rest to 1.5 m/s, a hard stop, and two centimetres of noise.
+  double x_m = 0.0;
+  for (int i = 0; i < 90; ++i) {
+    const double speed = i < 30 ? 0.0 : i < 60 ? 1.5 : 0.0;
+    x_m += speed / 15.0;
+    EXPECT_FALSE(show(i, x_m + (i % 2 ? 0.02 : -0.02))) << i;
+  }
+}
+
 TEST_F(PoseGateTest, RobotsAreJudgedApart) {
   ASSERT_FALSE(show(0, 0.0));
   EXPECT_FALSE(show(1, 50.0, 90.0, "r2")) << "another robot's first pose";

@@ -194,49 +194,52 @@ TEST(FitsInside, PartsOfAnySizeButNothingLarger) {
   EXPECT_TRUE(fits_inside(box_of(0, 0, {0.3, 0.3, 1.2}), whole, 0.5));
 }
 
-class Relocation : public ::testing::Test {
- protected:
-  static constexpr StampNs kSecond = 1'000'000'000;
-  void removed(std::uint32_t id, ClassId class_id, const OrientedBox& box, double at_s) {
-    memory_.remember({ObjectId{id}, class_id, box, 5, static_cast<StampNs>(at_s) * kSecond});
+TEST(SameSide, OneFaceOfTheWhole) {
+  const OrientedBox whole = box_of(0, 0, {1.0, 0.5, 0.8});
+  EXPECT_TRUE(same_side(box_of(0, 0, {0.02, 1.0, 0.8}), whole, 0.0)) << "its long side";
+  EXPECT_TRUE(same_side(box_of(0, 0, {0.5, 0.02, 0.8}), whole, 0.0)) << "its end";
+  EXPECT_FALSE(same_side(box_of(0, 0, {0.75, 0.02, 0.8}), whole, 0.0)) << "neither";
+  EXPECT_FALSE(same_side(box_of(0, 0, {1.0, 0.02, 0.4}), whole, 0.0)) << "half as high";
+}
+
+TEST(Filled, ThinBoxesGrowAwayFromTheEye) {
+  const OrientedBox face = box_of(2.0, 0.0, {0.02, 1.0, 0.8});
+  const OrientedBox from_left = filled(face, {0, 0, 1}, 0.4);
+  EXPECT_NEAR(from_left.size_m.x(), 0.4, 1e-12);
+  EXPECT_NEAR(from_left.size_m.y(), 1.0, 1e-12);
+  // The near side stays at 1.99.
+  EXPECT_NEAR(from_left.pose.position_W.x() - 0.2, 1.99, 1e-12);
+  const OrientedBox from_right = filled(face, {5, 0, 1}, 0.4);
+  EXPECT_NEAR(from_right.pose.position_W.x() + 0.2, 2.01, 1e-12);
+}
+
+TEST(CompletedBox, PartOfAMovedThingIsPlacedWholeWithTheLeastMotion) {
+  const OrientedBox known = box_of(0.0, 3.0, {2.0, 0.5, 1.0});
+  const Eigen::Vector3d eye_W(0, 0, 0.5);
+  // Its left third is seen 0.4 m farther away; nothing says that it slid.
+  OrientedBox whole = completed_box(box_of(-0.7, 3.2, {0.6, 0.04, 1.0}), known, eye_W, 0.4);
+  EXPECT_NEAR(whole.pose.position_W.x(), 0.0, 1e-12);
+  EXPECT_NEAR(whole.pose.position_W.y(), 3.18 + 0.25, 1e-12) << "behind the face that is seen";
+  EXPECT_TRUE(whole.size_m.isApprox(Eigen::Vector3d(2.0, 0.5, 1.0)));
+  // A part that sticks out by 0.3 m: it slid by at least that.
+  whole = completed_box(box_of(1.0, 2.77, {0.6, 0.04, 1.0}), known, eye_W, 0.4);
+  EXPECT_NEAR(whole.pose.position_W.x(), 0.3, 1e-12);
+}
+
+TEST(RelocationMemory, HoldsWhatWasRemovedWithinTheWindow) {
+  constexpr StampNs kSecond = 1'000'000'000;
+  RelocationMemory memory;
+  for (std::uint32_t id : {1u, 2u}) {
+    RelocationMemory::Removed removed{};
+    removed.id = ObjectId{id};
+    removed.removed_ns = (id == 1 ? 100 : 150) * kSecond;
+    memory.remember(removed);
   }
-  std::optional<ObjectId> find(ClassId class_id, const OrientedBox& box, double at_s) {
-    const auto* found =
-        memory_.find(class_id, box, static_cast<StampNs>(at_s) * kSecond, 60.0, 2.5, 0.15);
-    return found ? std::optional(found->id) : std::nullopt;
-  }
-  const Eigen::Vector3d size_{1.0, 0.5, 0.8};
-  RelocationMemory memory_;
-};
-
-TEST_F(Relocation, LikeThingOfTheClassIsTheRemovedOne) {
-  removed(1, 7, box_of(0, 0, size_), 100);
-  EXPECT_EQ(find(7, box_of(20, 20, size_), 101), ObjectId{1}) << "seen whole: at any distance";
-  EXPECT_FALSE(find(9, box_of(1, 0, size_), 101)) << "another class";
-  EXPECT_FALSE(find(7, box_of(1, 0, {2.0, 1.5, 0.8}), 101)) << "larger";
-}
-
-TEST_F(Relocation, PartialViewMustBeWithinReach) {
-  removed(1, 7, box_of(0, 0, size_), 100);
-  const Eigen::Vector3d part(0.4, 0.05, 0.7);
-  EXPECT_EQ(find(7, box_of(2.0, 0, part), 101), ObjectId{1});
-  EXPECT_FALSE(find(7, box_of(3.0, 0, part), 101));
-}
-
-TEST_F(Relocation, NearestOfSeveral) {
-  removed(1, 7, box_of(0, 0, size_), 100);
-  removed(2, 7, box_of(4, 0, size_), 100);
-  EXPECT_EQ(find(7, box_of(3, 0, size_), 101), ObjectId{2});
-  EXPECT_EQ(find(7, box_of(1, 0, size_), 101), ObjectId{1});
-}
-
-TEST_F(Relocation, ForgetsAfterTheWindowAndWhenFound) {
-  removed(1, 7, box_of(0, 0, size_), 100);
-  removed(2, 7, box_of(0, 0, size_), 150);
-  EXPECT_EQ(find(7, box_of(0, 0, size_), 160), ObjectId{1}) << "at the window's end";
-  EXPECT_EQ(find(7, box_of(0, 0, size_), 161), ObjectId{2});
-  memory_.forget(ObjectId{2});
-  EXPECT_FALSE(find(7, box_of(0, 0, size_), 161));
+  EXPECT_EQ(memory.recent(160 * kSecond, 60.0).size(), 2u) << "at the window's end";
+  ASSERT_EQ(memory.recent(161 * kSecond, 60.0).size(), 1u);
+  EXPECT_EQ(memory.recent(161 * kSecond, 60.0)[0].id, ObjectId{2});
+  memory.forget(ObjectId{2});
+  EXPECT_TRUE(memory.recent(161 * kSecond, 60.0).empty());
 }
 
 }  // namespace

@@ -28,13 +28,19 @@ struct LibraryObject {
   Belief belief;
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;
+  StampNs verified_ns = 0;         ///< when it was seen in its place with nothing against it
+  StampNs contested_ns = 0;        ///< when its place was seen empty or covered in good part
+  StampNs contested_since_ns = 0;  ///< the first such frame after it was verified
+  std::optional<bool> arrived;     ///< whether its place was seen empty before; when asked
   std::string last_robot;
   std::uint32_t observations = 0;
   int frames_in_view = 0;           ///< tentative only
   int frames_seen_through = 0;      ///< in a row
   int frames_displaced = 0;         ///< in a row
   OrientedBox reported_box;         ///< as in the last event
+  OrientedBox expected_box;         ///< of one that moved: where all of it must be; else of size 0
   bool growing = false;             ///< the last observation added a notable share of its points
+  bool cut = false;                 ///< the last observation went on out of sight
   std::size_t gained = 0;           ///< points since the last event
   std::size_t lost = 0;             ///< points since the last event
   std::optional<StampNs> added_ns;  ///< when reported as new; unset for what was known before

@@ -18,6 +18,7 @@ struct ReportedEvent {
   std::string class_name;
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
   std::optional<Eigen::Vector3d> previous_W;  ///< MOVED: where it was
+  std::optional<std::uint32_t> absorbed;      ///< id that turned out to be this object
 };
 
 /// Reads what EventsCsv wrote, in order. Throws InputError naming file, line and column.

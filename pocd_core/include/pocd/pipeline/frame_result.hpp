@@ -56,6 +56,8 @@ struct ObjectEvent {
   std::string robot;
   OrientedBox box;                          ///< now (for REMOVED: the last one)
   std::optional<OrientedBox> previous_box;  ///< MOVED: where it was
+  /// An object that was reported as ADDED before and turned out to be this one; its id is retired.
+  std::optional<ObjectId> absorbed;
   Evidence evidence;
 };
 

@@ -23,6 +23,9 @@ struct Observation {
   std::vector<SurfacePoint> points;
   int pixels = 0;        ///< of the strided grid
   double area_m2 = 0.0;  ///< of the surface seen face on
+  /// Share of its outline (sides and top) where the image, the depth limit or something nearer cuts
+  /// it off: above about 0.1 it goes on unseen.
+  double cut_share = 0.0;
 };
 
 struct Observations {

@@ -38,6 +38,20 @@ bool alike(const OrientedBox& a, const OrientedBox& b, double slack_m);
 /// `slack_m`.
 bool fits_inside(const OrientedBox& part, const OrientedBox& whole, double slack_m);
 
+/// True when a side of `part` seen face on (a horizontal size and the height) is a side of `whole`,
+/// each within 20 % or `slack_m`.
+bool same_side(const OrientedBox& part, const OrientedBox& whole, double slack_m);
+
+/// The box with horizontal sizes of at least `least_m`, extended away from the eye: of a thing that
+/// was seen from one side only its near face is known.
+OrientedBox filled(const OrientedBox& box, const Eigen::Vector3d& eye_W, double least_m);
+
+/// Where all of a thing must be of which only `part` is seen after it moved from `known`: as large
+/// as it was, on the seen side of what is seen, and no farther along it from its old place than
+/// needed.
+OrientedBox completed_box(const OrientedBox& part, const OrientedBox& known,
+                          const Eigen::Vector3d& eye_W, double least_m);
+
 /// Remembers what was removed, so that a like object that turns up is reported as moved.
 class RelocationMemory {
  public:
@@ -46,15 +60,15 @@ class RelocationMemory {
     ClassId class_id;
     OrientedBox box;
     StampNs first_seen_ns;
+    StampNs verified_ns;
+    StampNs contested_since_ns;
     StampNs removed_ns;
   };
   void remember(const Removed& removed) { removed_.push_back(removed); }
 
-  /// Nearest removed object of this class that `box` may be, seen whole (alike) or in part: then it
-  /// must lie within `reach_m`. Entries older than the window are forgotten. Valid until the next
-  /// call.
-  const Removed* find(ClassId class_id, const OrientedBox& box, StampNs now_ns, double window_s,
-                      double reach_m, double slack_m);
+  /// What was removed within the last `window_s` before `now_ns` [s], oldest first; older entries
+  /// are forgotten. Valid until the next call.
+  const std::deque<Removed>& recent(StampNs now_ns, double window_s);
   void forget(ObjectId id);
 
  private:

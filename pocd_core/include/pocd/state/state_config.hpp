@@ -21,6 +21,7 @@ struct StateConfig {
   int merge_frames = 10;
   double relocation_window_s = 60.0;
   double relocation_reach_m = 2.5;
+  double least_depth_m = 0.4;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -59,6 +60,10 @@ struct StateConfig {
           "[s].");
     visit("relocation_reach_m", relocation_reach_m, Range{0.0, 1e6},
           "A new object that is seen only in part is the removed one within this distance [m].");
+    visit(
+        "least_depth_m", least_depth_m, Range{0.0, 100.0},
+        "How deep things of the place are at least, where only their near side was seen: a new one "
+        "that would overlap a like known one took its place [m].");
   }
 };
 
