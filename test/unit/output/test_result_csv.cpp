@@ -95,12 +95,12 @@ std::string read_error(const std::string& text) {
 }
 
 TEST(ResultCsv, BadEventFilesAreNamed) {
-  const std::string header = "kind,object_id,class_name,x,y,z,previous_x,previous_y,previous_z\n";
-  EXPECT_EQ(read_error(header + "ADDED,1,box,0,0,0,,,\n"), "no error");
+  const std::string header = "kind,object_id,class_name,x,y,z,previous_x,previous_y,previous_z,absorbed\n";
+  EXPECT_EQ(read_error(header + "ADDED,1,box,0,0,0,,,,\n"), "no error");
   EXPECT_EQ(read_error(""), "e.csv: cannot be read or is empty");
-  EXPECT_EQ(read_error(header + "ADDED,1,box\n"), "e.csv:2: 3 cells, the header has 9");
-  EXPECT_EQ(read_error(header + "LOST,1,box,0,0,0,,,\n"), "e.csv:2: kind \"LOST\" is unknown");
-  EXPECT_EQ(read_error(header + "ADDED,1,box,0,0m,0,,,\n"), "e.csv:2: y \"0m\" is no number");
+  EXPECT_EQ(read_error(header + "ADDED,1,box\n"), "e.csv:2: 3 cells, the header has 10");
+  EXPECT_EQ(read_error(header + "LOST,1,box,0,0,0,,,,\n"), "e.csv:2: kind \"LOST\" is unknown");
+  EXPECT_EQ(read_error(header + "ADDED,1,box,0,0m,0,,,,\n"), "e.csv:2: y \"0m\" is no number");
   EXPECT_EQ(read_error("kind\nADDED\n"), "e.csv:2: no column object_id");
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace pocd {
 namespace {
 
@@ -93,12 +95,12 @@ TEST_F(PoseGateTest, JumpTooShortForTheSpeedIsOffTheWay) {
 }
 
 TEST_F(PoseGateTest, StartsStopsAndTurnsAreOnTheWay) {
-  // From rest to 1.5 m/s, a hard stop, and two centimetres of noise.
-  double x_m = 0.0;
+  // From rest to 1.5 m/s and back within 0.3 s each (5 m/s2), with a centimetre of noise.
+  double x_m = 0.0, speed = 0.0;
   for (int i = 0; i < 90; ++i) {
-    const double speed = i < 30 ? 0.0 : i < 60 ? 1.5 : 0.0;
+    speed = std::clamp(speed + (i < 30 ? 0.0 : i < 60 ? 1.0 : -1.0) * 5.0 / 15.0, 0.0, 1.5);
     x_m += speed / 15.0;
-    EXPECT_FALSE(show(i, x_m + (i % 2 ? 0.02 : -0.02))) << i;
+    EXPECT_FALSE(show(i, x_m + (i % 2 ? 0.01 : -0.01))) << i;
   }
 }
 
