@@ -1,0 +1,59 @@
+// Clocks and order statistics of the benchmark.
+#pragma once
+
+#include <time.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace pocd::bench {
+
+inline double clock_ms(clockid_t clock) {
+  timespec t;
+  clock_gettime(clock, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+/// CPU time of the whole process, that is of all threads of a pool.
+inline double cpu_ms() { return clock_ms(CLOCK_PROCESS_CPUTIME_ID); }
+inline double wall_ms() { return clock_ms(CLOCK_MONOTONIC); }
+
+/// The value below which `share` of the values lie; 0 without values.
+inline double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto last = static_cast<double>(values.size() - 1);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * last + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+inline double median(const std::vector<double>& values) { return quantile(values, 0.5); }
+
+/// What one way of doing one thing took, by frame; a repeated pass keeps the faster of the two, so
+/// that what else the machine does at the time is filtered out.
+class Series {
+ public:
+  void add(std::size_t frame, double cpu, double wall) {
+    if (frame == cpu_.size()) {
+      cpu_.push_back(cpu);
+      wall_.push_back(wall);
+      return;
+    }
+    cpu_.at(frame) = std::min(cpu_[frame], cpu);
+    wall_.at(frame) = std::min(wall_[frame], wall);
+  }
+  const std::vector<double>& cpu() const { return cpu_; }
+  const std::vector<double>& wall() const { return wall_; }
+
+ private:
+  std::vector<double> cpu_, wall_;
+};
+
+/// Times one call of `work`.
+template <class Work>
+void time_into(Series& series, std::size_t frame, const Work& work) {
+  const double cpu = cpu_ms(), wall = wall_ms();
+  work();
+  series.add(frame, cpu_ms() - cpu, wall_ms() - wall);
+}
+
+}  // namespace pocd::bench
