@@ -16,6 +16,10 @@ constexpr double kSharedTotal = 0.2;
 constexpr double kSharedOdd = 0.2;
 /// This share of a new thing within the room that another needs is a part of that.
 constexpr double kInsideShare = 0.7;
+/// What stands in so much of a thing of another class has replaced it.
+constexpr double kReplacedShare = 0.5;
+/// A part of something waits so many times longer for the rest to be seen.
+constexpr std::uint32_t kPartPatience = 4;
 /// Farther apart are no two parts of one thing [m].
 constexpr double kReach_m = 3.0;
 /// Two things whose boxes would overlap by this share of the smaller one are not both there.
@@ -330,7 +334,20 @@ LibraryObject* ObjectTracker::displaced_by(const Step& step, const LibraryObject
   return nullptr;
 }
 
-bool ObjectTracker::may_be_part(const LibraryObject& found) const {
+LibraryObject* ObjectTracker::replaced_by(const Step& step, const LibraryObject& found) {
+  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
+    LibraryObject* other = library_.find(id);
+    if (id != found.id && other->confirmed && other->class_id != found.class_id &&
+        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
+        other->contested_ns == step.frame.stamp_ns &&
+        box_overlap(found.box, other->box, config_.state.least_depth_m) >= kReplacedShare) {
+      return other;
+    }
+  }
+  return nullptr;
+}
+
+bool ObjectTracker::may_be_part(const Step& step, const LibraryObject& found) const {
   if (!found.cut) return false;
   const double margin_m = config_.state.least_depth_m;
   OrientedBox around = found.box;
@@ -339,7 +356,9 @@ bool ObjectTracker::may_be_part(const LibraryObject& found) const {
     const LibraryObject* other = library_.find(id);
     if (id != found.id && other->confirmed && other->class_id == found.class_id &&
         other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        box_overlap(around, other->box, margin_m) > 0.0) {
+        box_overlap(around, other->box, margin_m) > 0.0 &&
+        fits_inside(found.box, filled(other->box, step.cloud.T_W_C.translation(), margin_m),
+                    like_size_slack_m())) {
       return true;
     }
   }
@@ -433,7 +452,11 @@ void ObjectTracker::remove_or_confirm(Step& step) {
     if (explain(step, *object)) continue;
     const auto origin = origin_of(step, *object);
     const bool doubt = origin && (origin->live || object->growing);
-    if ((doubt && object->observations < needed + wait) || may_be_part(*object)) continue;
+    LibraryObject* replaced = replaced_by(step, *object);
+    if ((doubt || replaced) && object->observations < needed + wait) continue;
+    if (object->observations < needed + kPartPatience * wait && may_be_part(step, *object))
+      continue;
+    if (replaced) remove(step, replaced->id, "replaced");
     confirm(step, *object);
   }
 }

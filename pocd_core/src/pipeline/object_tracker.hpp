@@ -69,8 +69,10 @@ class ObjectTracker {
   LibraryObject* completed_by(const LibraryObject& found);
   /// A like object in question whose place a new one takes, so that it moved there; or null.
   LibraryObject* displaced_by(const Step& step, const LibraryObject& found);
+  /// A known object of another class in whose place a new one stands, so that it is gone; or null.
+  LibraryObject* replaced_by(const Step& step, const LibraryObject& found);
   /// Whether a new one is seen only in part, beside a like one that may have moved.
-  bool may_be_part(const LibraryObject& found) const;
+  bool may_be_part(const Step& step, const LibraryObject& found) const;
   /// Tries to explain a new object by what is known: as a part of it, or as what moved into the
   /// place of something. True when that was done; `found` may be gone then.
   bool explain(Step& step, LibraryObject& found);
