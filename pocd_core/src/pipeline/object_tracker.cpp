@@ -16,6 +16,7 @@ constexpr int kEstablishedHits = 2;
 constexpr double kOddShare = 0.25;
 constexpr int kShiftPoints = 60;
 constexpr int kDisplacedFrames = 3;
+constexpr int kOddFrames = 10;
 /// An observation that adds at least this share of points shows that the object is not seen whole
 /// yet.
 constexpr double kGrowingShare = 0.03;
@@ -157,7 +158,10 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   }
   if (!moved || moved->displacement_m < 0.6 * verified_m) {
     object.frames_displaced = 0;
-    return false;
+    // What lies beside the surface for a while may be the object, turned, of which too little is
+    // seen yet to tell: fused, it would make the two places one model.
+    object.frames_odd = suspicious ? object.frames_odd + 1 : 0;
+    return suspicious && object.frames_odd <= kOddFrames;
   }
   // Not fused: it would smear the model between the two places.
   if (++object.frames_displaced < kDisplacedFrames) return true;

@@ -37,6 +37,7 @@ struct LibraryObject {
   int frames_in_view = 0;           ///< tentative only
   int frames_seen_through = 0;      ///< in a row
   int frames_displaced = 0;         ///< in a row
+  int frames_odd = 0;               ///< in a row, much of it beside its surface but not aligned elsewhere
   OrientedBox reported_box;         ///< as in the last event
   OrientedBox expected_box;         ///< of one that moved: where all of it must be; else of size 0
   bool growing = false;             ///< the last observation added a notable share of its points
