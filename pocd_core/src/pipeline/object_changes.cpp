@@ -69,7 +69,10 @@ void ObjectTracker::join_companions(Step& step) {
   for (const auto& [survivor_id, absorbed_id] : joined) {
     LibraryObject* survivor = library_.find(survivor_id);
     LibraryObject* absorbed = library_.find(absorbed_id);
-    if (survivor && absorbed) absorb(step, *survivor, *absorbed);
+    if (!survivor || !absorbed) continue;
+    // What is known outside goes on; of two such, the older one.
+    if (absorbed->confirmed && !survivor->confirmed) std::swap(survivor, absorbed);
+    absorb(step, *survivor, *absorbed);
   }
 }
 
@@ -92,7 +95,6 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   refit_box(step, survivor);
   if (!was_known) return;
   step.result.retired.push_back(absorbed_id);
-  if (!survivor.confirmed) confirm(step, survivor);
   add_event(step, EventKind::kUpdated, survivor, "joined_" + std::to_string(to_index(absorbed_id)))
       .absorbed = absorbed_id;
   survivor.reported_box = survivor.box;

@@ -38,7 +38,8 @@ bool rule_holds(const ObjectEvent& event, const PipelineConfig& config) {
   if (e.rule == "aligned_elsewhere") return event.kind == EventKind::kMoved && e.after.mu == 0.0;
   // What is left or taken away of a surface, or who is who, is no matter of the belief.
   const std::set<std::string> others{"nothing_left", "confirmed", "found_again",
-                                     "slid",         "grew",      "part_removed"};
+                                     "recognised",   "slid",      "grew",
+                                     "part_removed", "replaced",  "place_taken"};
   return others.count(e.rule) > 0 || e.rule.rfind("joined_", 0) == 0;
 }
 
@@ -125,7 +126,7 @@ PipelineConfig drive_config() {
 TEST(Evidence, GivesTheBeliefAfterItOverAWholeRun) {
   const PipelineConfig config = drive_config();
   std::map<EventKind, int> all;
-  for (const char* name : {"shifted.yaml", "swapped.yaml"}) {
+  for (const char* name : {"shifted.yaml", "swapped.yaml", "aisle.yaml"}) {
     const std::vector<Told> events = events_of_a_drive(config, name);
     for (const auto& [kind, count] : recompute(events, config)) all[kind] += count;
   }
