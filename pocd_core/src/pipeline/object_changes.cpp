@@ -14,23 +14,8 @@ constexpr int kSharedPoints = 10;
 /// The same share of all its points, and at most this many times as many against it.
 constexpr double kSharedTotal = 0.2;
 constexpr double kSharedOdd = 0.2;
-/// This share of a new thing within the room that another needs is a part of that.
-constexpr double kInsideShare = 0.7;
-/// What stands in so much of a thing of another class has replaced it.
-constexpr double kReplacedShare = 0.5;
 /// A part of something waits so many times longer for the rest to be seen.
 constexpr std::uint32_t kPartPatience = 4;
-/// Farther apart are no two parts of one thing [m].
-constexpr double kReach_m = 3.0;
-/// Two things whose boxes would overlap by this share of the smaller one are not both there.
-constexpr double kTakenShare = 0.25;
-/// This share of a thing's surface in places that were seen empty makes it an arrival.
-constexpr double kArrivedShare = 0.3;
-constexpr double kSamePass_s = 4.0;
-/// Nothing is moved unseen in less time.
-constexpr double kAbsence_s = 5.0;
-/// This share of the points at one end was seen through.
-constexpr double kSeenEndShare = 0.25;
 /// A known object slid along itself when it lost and gained at least this share of its points.
 constexpr double kSlidShare = 0.12;
 
@@ -100,36 +85,6 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   survivor.reported_box = survivor.box;
 }
 
-LibraryObject* ObjectTracker::part_of(const Step& step, const LibraryObject& found) {
-  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    // Both are there, and two solid things are not in one place.
-    if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->verified_ns >= found.first_seen_ns && takes_place_of(step, found, *other)) {
-      return other;
-    }
-  }
-  return nullptr;
-}
-
-LibraryObject* ObjectTracker::completed_by(const LibraryObject& found) {
-  const double margin_m = 2.0 * config_.map.voxel_size_m;
-  for (const ObjectId id : library_.near(found.box.pose.position_W, kReach_m)) {
-    LibraryObject* other = library_.find(id);
-    if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
-        other->expected_box.size_m.isZero() || other->frames_seen_through > 0) {
-      continue;
-    }
-    OrientedBox room = other->expected_box;
-    room.size_m += Eigen::Vector3d::Constant(2.0 * margin_m);
-    if (box_overlap(found.box, room, margin_m) >= kInsideShare &&
-        fits_inside(found.box, other->expected_box, like_size_slack_m())) {
-      return other;
-    }
-  }
-  return nullptr;
-}
-
 void ObjectTracker::mark_changed(LibraryObject& object) {
   if (!object.changed) changed_.push_back(object.id);
   object.changed = true;
@@ -192,105 +147,11 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found,
   if (found.cut) event.box = found.expected_box;
 }
 
-void ObjectTracker::link_additions(Step& step) {
-  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
-  const std::vector<ObjectId> ids = changed_;
-  for (const ObjectId id : ids) {
-    LibraryObject* object = library_.find(id);
-    if (!object || !notable_change(*object)) continue;
-    if (!object->expected_box.size_m.isZero()) take_rest(step, *object);
-    if (!object->added_ns || step.frame.stamp_ns - *object->added_ns > window_ns) continue;
-    if (explain(step, *object)) continue;
-    const auto origin = origin_of(step, *object);
-    if (origin && origin->removed) report_move(step, *object, *origin->removed, "recognised");
-  }
-}
-
-void ObjectTracker::take_rest(Step& step, LibraryObject& moved) {
-  for (const ObjectId id :
-       library_.near(moved.box.pose.position_W, moved.expected_box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    if (other->added_ns && completed_by(*other) == &moved) absorb(step, moved, *other);
-  }
-}
-
-bool ObjectTracker::explain(Step& step, LibraryObject& found) {
-  if (LibraryObject* whole = part_of(step, found)) {
-    absorb(step, *whole, found);
-    return true;
-  }
-  if (LibraryObject* displaced = displaced_by(step, found)) {
-    remove(step, displaced->id, "place_taken", &found);
-    return true;
-  }
-  if (origin_of(step, found)) return false;
-  if (LibraryObject* whole = completed_by(found)) {
-    absorb(step, *whole, found);
-    return true;
-  }
-  return false;
-}
-
 bool ObjectTracker::notable_change(const LibraryObject& object) const {
   const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
   const OrientedBox &now = object.box, &then = object.reported_box;
   return (now.pose.position_W - then.pose.position_W).norm() > notable_m ||
          (now.size_m - then.size_m).cwiseAbs().maxCoeff() > notable_m;
-}
-
-bool ObjectTracker::has_arrived(LibraryObject& object) const {
-  if (!object.arrived) {
-    Points points_W;
-    for (const Surfel& s : object.model.surfels()) points_W.push_back(s.point_W);
-    object.arrived =
-        views_.seen_empty_share(points_W, object.first_seen_ns, config_.map.max_depth_m,
-                                config_.change.tau_m) > kArrivedShare;
-  }
-  return *object.arrived;
-}
-
-std::optional<ObjectTracker::Origin> ObjectTracker::origin_of(const Step& step,
-                                                              LibraryObject& found) {
-  const StateConfig& state = config_.state;
-  const StampNs now_ns = step.frame.stamp_ns;
-  const Eigen::Vector3d& here_W = found.box.pose.position_W;
-  // In a place that was not seen before, a thing is new only if another like it left about when it
-  // was found.
-  const auto pass_ns = static_cast<StampNs>(kSamePass_s * 1e9);
-  const auto left_then = [&](StampNs contested_since_ns, StampNs contested_ns) {
-    return contested_since_ns < found.first_seen_ns + pass_ns &&
-           contested_ns > found.first_seen_ns - pass_ns;
-  };
-  const auto distance_to = [&](const OrientedBox& box) {
-    return (box.pose.position_W - here_W).head<2>().norm();
-  };
-  std::optional<Origin> best;
-  for (const auto& removed : relocations_.recent(now_ns, state.relocation_window_s)) {
-    const double distance = distance_to(removed.box);
-    if (removed.class_id != found.class_id || !may_be(found, removed.box)) continue;
-    // What was seen in its place when the new one was there, too, is another thing.
-    if (removed.verified_ns >= found.first_seen_ns) continue;
-    if (!has_arrived(found) && (distance > state.relocation_reach_m ||
-                                !left_then(removed.contested_since_ns, removed.removed_ns)))
-      continue;
-    if (!best || distance < best->distance_m) best = Origin{&removed, nullptr, distance};
-  }
-  const auto absence_ns = static_cast<StampNs>(kAbsence_s * 1e9);
-  for (const ObjectId id : library_.near(here_W, state.relocation_reach_m)) {
-    LibraryObject* other = library_.find(id);
-    if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
-        other->first_seen_ns >= found.first_seen_ns || other->verified_ns >= found.first_seen_ns ||
-        !may_be(found, other->box)) {
-      continue;
-    }
-    const bool contested = other->contested_ns >= found.first_seen_ns;
-    if (!contested && found.first_seen_ns - other->verified_ns < absence_ns) continue;
-    if (!has_arrived(found) && !left_then(other->contested_since_ns, other->contested_ns)) continue;
-    const double distance = distance_to(other->box);
-    if (distance > state.relocation_reach_m) continue;
-    if (!best || distance < best->distance_m) best = Origin{nullptr, other, distance};
-  }
-  return best;
 }
 
 void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id,
@@ -308,94 +169,6 @@ void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id
   auto& retired = step.result.retired;
   retired.erase(std::remove(retired.begin(), retired.end(), id), retired.end());
   mark_changed(object);
-}
-
-bool ObjectTracker::may_be(const LibraryObject& found, const OrientedBox& known) const {
-  const double slack_m = like_size_slack_m();
-  // Of a thing that was seen from one side its depth is not known.
-  OrientedBox a = found.box, b = known;
-  for (OrientedBox* box : {&a, &b})
-    box->size_m.head<2>() = box->size_m.head<2>().cwiseMax(config_.state.least_depth_m);
-  if (alike(a, b, slack_m)) return true;
-  const double distance = (a.pose.position_W - b.pose.position_W).norm();
-  if (distance > config_.state.relocation_reach_m || !fits_inside(a, b, slack_m)) return false;
-  // What is not seen whole yet may still grow into the size.
-  return found.growing || found.cut || same_side(a, b, slack_m);
-}
-
-LibraryObject* ObjectTracker::displaced_by(const Step& step, const LibraryObject& found) {
-  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        other->contested_ns >= found.first_seen_ns && may_be(found, other->box) &&
-        takes_place_of(step, found, *other)) {
-      return other;
-    }
-  }
-  return nullptr;
-}
-
-LibraryObject* ObjectTracker::replaced_by(const Step& step, const LibraryObject& found) {
-  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    if (id != found.id && other->confirmed && other->class_id != found.class_id &&
-        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        other->contested_ns == step.frame.stamp_ns &&
-        box_overlap(found.box, other->box, config_.state.least_depth_m) >= kReplacedShare) {
-      return other;
-    }
-  }
-  return nullptr;
-}
-
-bool ObjectTracker::may_be_part(const Step& step, const LibraryObject& found) const {
-  if (!found.cut) return false;
-  const double margin_m = config_.state.least_depth_m;
-  OrientedBox around = found.box;
-  around.size_m += Eigen::Vector3d(2.0 * margin_m, 2.0 * margin_m, 0.0);
-  for (const ObjectId id : library_.near(around.pose.position_W, around.size_m.norm())) {
-    const LibraryObject* other = library_.find(id);
-    if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        box_overlap(around, other->box, margin_m) > 0.0 &&
-        fits_inside(found.box, filled(other->box, step.cloud.T_W_C.translation(), margin_m),
-                    like_size_slack_m())) {
-      return true;
-    }
-  }
-  return false;
-}
-
-bool ObjectTracker::takes_place_of(const Step& step, const LibraryObject& found,
-                                   const LibraryObject& known) const {
-  const Eigen::Vector3d eye_W = step.cloud.T_W_C.translation();
-  const double least_m = config_.state.least_depth_m;
-  return box_overlap(filled(found.box, eye_W, least_m), filled(known.box, eye_W, least_m), 0.0) >=
-         kTakenShare;
-}
-
-LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject& object) {
-  LibraryObject* best = nullptr;
-  double best_distance = 0.0;
-  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
-  for (const ObjectId id :
-       library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
-    LibraryObject* other = library_.find(id);
-    if (other == &object || other->class_id != object.class_id) continue;
-    const bool named = !other->confirmed && other->moved_from == object.id;
-    if (!named && other->observations < 2) continue;
-    const bool open = other->confirmed
-                          ? other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns
-                          : other->last_seen_ns == step.frame.stamp_ns;
-    if (!open) continue;
-    const auto origin = origin_of(step, *other);
-    if (!named && (!origin || origin->live != &object)) continue;
-    // Aligned with it and found alike.
-    const double distance_m = named ? 0.0 : origin->distance_m;
-    if (!best || distance_m < best_distance) best = other, best_distance = distance_m;
-  }
-  return best;
 }
 
 void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule,
@@ -461,47 +234,6 @@ void ObjectTracker::remove_or_confirm(Step& step) {
     if (replaced) remove(step, replaced->id, "replaced");
     confirm(step, *object);
   }
-}
-
-bool ObjectTracker::slide(Step& step, LibraryObject& object) {
-  const OrientedBox then = object.reported_box;
-  const StampNs before_ns = step.frame.stamp_ns - static_cast<StampNs>(kAbsence_s * 1e9);
-  if (object.first_seen_ns >= before_ns || object.gained == 0) return false;
-  // Along the axis on which it grew.
-  const Eigen::Vector3d grown = object.box.size_m - then.size_m;
-  const int axis = grown.x() >= grown.y() ? 0 : 1;
-  const double yaw = then.pose.yaw_rad + (axis == 0 ? 0.0 : 0.5 * M_PI);
-  const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
-  const double shift_m = 2.0 * (object.box.pose.position_W - then.pose.position_W).dot(along_W);
-  const double length_m = then.size_m[axis];
-  if (std::abs(shift_m) < 2.0 * config_.map.voxel_size_m || std::abs(shift_m) > length_m ||
-      std::abs(std::abs(shift_m) - grown[axis]) > 0.5 * std::abs(shift_m)) {
-    return false;
-  }
-  // What was gained lies where nothing was, and the other end was seen through.
-  const double sign = shift_m > 0.0 ? 1.0 : -1.0;
-  const double new_end_m = 0.5 * length_m, old_end_m = new_end_m - std::abs(shift_m);
-  Points gained_W;
-  int end = 0, through = 0;
-  for (const Surfel& s : object.model.surfels()) {
-    const double at_m = sign * (s.point_W.cast<double>() - then.pose.position_W).dot(along_W);
-    if (at_m > new_end_m) gained_W.push_back(s.point_W);
-    if (at_m < -old_end_m) ++end, through += s.seen_through > 0;
-  }
-  if (end == 0 || through < kSeenEndShare * end ||
-      views_.seen_empty_share(gained_W, before_ns, config_.map.max_depth_m,
-                              2.0 * config_.map.voxel_size_m) < kArrivedShare) {
-    return false;
-  }
-  auto& surfels = object.model.surfels();
-  for (Surfel& s : surfels) {
-    const double at_m = sign * (s.point_W.cast<double>() - then.pose.position_W).dot(along_W);
-    if (at_m < -old_end_m) s.seen_through = 255;
-  }
-  object.model.erode(255);
-  object.icp_target.reset();
-  refit_box(step, object);
-  return true;
 }
 
 void ObjectTracker::report_changes(Step& step) {
