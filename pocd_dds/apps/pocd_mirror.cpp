@@ -1,6 +1,7 @@
 // Follows the published map into a copy and writes it to files.
 #include <cstdio>
 #include <filesystem>
+#include <map>
 
 #include "apps/common.hpp"
 #include "pocd/map/birdseye.hpp"
@@ -118,6 +119,13 @@ int main(int argc, char** argv) {
                  "End when the copy equals this version of the map or a later one");
   app.add_option("--timeout", options.timeout_s, "Give up after that many seconds")
       ->check(CLI::PositiveNumber);
+  const std::map<std::string, pocd::CatchUp> means{{"either", pocd::CatchUp::kEither},
+                                                   {"tiles", pocd::CatchUp::kTiles},
+                                                   {"snapshot", pocd::CatchUp::kSnapshot}};
+  app.add_option("--catch-up", options.mirror.catch_up,
+                 "How to get what was missed: from the tiles kept for late joiners, or by asking")
+      ->transform(CLI::CheckedTransformer(means))
+      ->option_text("either, tiles or snapshot; default: either");
   int domain = -1;
   pocd::dds::add_bus_options(app, domain, options.mirror.profiles_file);
   try {

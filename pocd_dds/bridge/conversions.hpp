@@ -13,7 +13,7 @@
 #include "nav_msgs.h"
 #include "pocd/input/camera_model.hpp"
 #include "pocd/input/pose_quaternion.hpp"
-#include "pocd/map/map_delta.hpp"
+#include "pocd/map/map_follower.hpp"
 #include "pocd/pipeline/frame_result.hpp"
 #include "pocd/segmentation/class_map.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
@@ -97,10 +97,16 @@ std::vector<pocd_msgs::msg::MapDelta> delta_messages(const MapDelta& delta, std:
 /// The step that all its parts (in order, complete) make; nothing when a CRC does not fit.
 std::optional<MapDelta> delta_from(const std::vector<pocd_msgs::msg::MapDelta>& parts);
 
-/// Every tile newer than `newer_than` and the keys of all, cut like a delta.
-std::vector<pocd_msgs::msg::MapSnapshotReply> snapshot_messages(
-    const MapPublisher& publisher, std::uint64_t newer_than,
-    const pocd_msgs::msg::MapSnapshotRequest& request, std::size_t part_bytes);
+/// Every tile newer than `base_version` and the keys of all, cut like a delta.
+std::vector<pocd_msgs::msg::MapSnapshotReply> snapshot_messages(const MapPublisher& publisher,
+                                                                std::uint64_t base_version,
+                                                                std::uint32_t map_id,
+                                                                std::size_t part_bytes);
+/// Without tiles and keys.
+MapSnapshot snapshot_header(const pocd_msgs::msg::MapSnapshotReply& message);
+/// What all parts (in order, complete) make; nothing when a CRC does not fit.
+std::optional<MapSnapshot> snapshot_from(
+    const std::vector<pocd_msgs::msg::MapSnapshotReply>& parts);
 
 TileKey key_from(const pocd_msgs::msg::TileKey& key);
 std::optional<MapTile> tile_from(const pocd_msgs::msg::TileData& data);

@@ -7,6 +7,8 @@
 namespace pocd::dds {
 namespace {
 
+constexpr std::size_t kKeyBytes = 12;  // of a tile, on the wire
+
 std_msgs::msg::Header header_of(StampNs stamp_ns, const std::string& frame_id) {
   std_msgs::msg::Header header;
   header.stamp(to_time(stamp_ns));
@@ -90,11 +92,11 @@ void number_parts(std::vector<Message>& parts) {
   }
 }
 
-/// Appends `tiles` to the last message of `parts`, opening a new one (a copy of `empty`) when full.
+/// Appends `tiles` to the last message of `parts`, which holds `bytes` already, opening a new one
+/// (a copy of `empty`) when full.
 template <class Message, class Tiles>
 void append_tiles(std::vector<Message>& parts, const Message& empty, const Tiles& tiles,
-                  std::size_t part_bytes) {
-  std::size_t bytes = 0;
+                  std::size_t part_bytes, std::size_t bytes) {
   for (const MapTile* tile : tiles) {
     if (bytes > 0 && bytes + tile->payload.size() > part_bytes) {
       parts.push_back(empty);
@@ -298,10 +300,14 @@ std::vector<pocd_msgs::msg::MapDelta> delta_messages(const MapDelta& delta, std:
   empty.stamp(to_time(stamp_ns));
   empty.digest(digest_message(delta.digest));
   std::vector<pocd_msgs::msg::MapDelta> parts{empty};
-  for (const TileKey& key : delta.removed) parts.back().removed().push_back(key_of(key));
+  const std::size_t most_keys = part_bytes / kKeyBytes;
+  for (const TileKey& key : delta.removed) {
+    if (parts.back().removed().size() == most_keys) parts.push_back(empty);
+    parts.back().removed().push_back(key_of(key));
+  }
   std::vector<const MapTile*> tiles;
   for (const MapTile& tile : delta.changed) tiles.push_back(&tile);
-  append_tiles(parts, empty, tiles, part_bytes);
+  append_tiles(parts, empty, tiles, part_bytes, parts.back().removed().size() * kKeyBytes);
   number_parts(parts);
   return parts;
 }
@@ -324,25 +330,51 @@ std::optional<MapDelta> delta_from(const std::vector<pocd_msgs::msg::MapDelta>& 
   return delta;
 }
 
-std::vector<pocd_msgs::msg::MapSnapshotReply> snapshot_messages(
-    const MapPublisher& publisher, std::uint64_t newer_than,
-    const pocd_msgs::msg::MapSnapshotRequest& request, std::size_t part_bytes) {
+std::vector<pocd_msgs::msg::MapSnapshotReply> snapshot_messages(const MapPublisher& publisher,
+                                                                std::uint64_t base_version,
+                                                                std::uint32_t map_id,
+                                                                std::size_t part_bytes) {
   pocd_msgs::msg::MapSnapshotReply empty;
-  empty.requester(request.requester());
-  empty.request(request.request());
-  empty.map_id(request.map_id());
+  empty.map_id(map_id);
   empty.epoch(publisher.epoch());
+  empty.base_version(base_version);
   empty.version(publisher.version());
   empty.digest(digest_message(publisher.digest()));
   std::vector<pocd_msgs::msg::MapSnapshotReply> parts{empty};
   std::vector<const MapTile*> tiles;
+  const std::size_t most_keys = part_bytes / kKeyBytes;
   for (const auto& [key, tile] : publisher.tiles()) {
+    if (parts.back().present().size() == most_keys) parts.push_back(empty);
     parts.back().present().push_back(key_of(key));
-    if (tile.version > newer_than) tiles.push_back(&tile);
+    if (tile.version > base_version) tiles.push_back(&tile);
   }
-  append_tiles(parts, empty, tiles, part_bytes);
+  append_tiles(parts, empty, tiles, part_bytes, parts.back().present().size() * kKeyBytes);
   number_parts(parts);
   return parts;
+}
+
+MapSnapshot snapshot_header(const pocd_msgs::msg::MapSnapshotReply& message) {
+  MapSnapshot snapshot;
+  snapshot.epoch = message.epoch();
+  snapshot.base_version = message.base_version();
+  snapshot.version = message.version();
+  snapshot.digest = digest_from(message.digest());
+  return snapshot;
+}
+
+std::optional<MapSnapshot> snapshot_from(
+    const std::vector<pocd_msgs::msg::MapSnapshotReply>& parts) {
+  POCD_CHECK(!parts.empty());
+  MapSnapshot snapshot = snapshot_header(parts.front());
+  for (const auto& part : parts) {
+    for (const auto& key : part.present()) snapshot.present.push_back(key_from(key));
+    for (const auto& data : part.changed()) {
+      std::optional<MapTile> tile = tile_from(data);
+      if (!tile) return std::nullopt;
+      snapshot.changed.push_back(std::move(*tile));
+    }
+  }
+  return snapshot;
 }
 
 TileKey key_from(const pocd_msgs::msg::TileKey& key) { return {key.x(), key.y(), key.z()}; }

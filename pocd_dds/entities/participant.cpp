@@ -1,5 +1,7 @@
 #include "pocd_dds/entities/participant.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <cstdlib>
@@ -13,6 +15,7 @@
 #include <mutex>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/entities/socket_buffers.hpp"
 
 namespace pocd::dds {
 
@@ -29,11 +32,11 @@ constexpr std::uint32_t kSegmentBytes = 32u << 20;
 constexpr std::uint32_t kSocketBytes = 4u << 20;
 constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbers overflow
 
-// Map data leaves at most at this rate, so that objects never queue behind it. The name has to
-// outlive every participant.
+// The name has to outlive every participant.
 constexpr const char* kMapFlow = "pocd_map_flow";
-constexpr std::int32_t kMapBytesPerPeriod = 2 << 20;
 constexpr std::uint64_t kMapPeriodMs = 50;
+// A process that dies without a word is noticed after this time; the default is 20 s.
+constexpr std::int32_t kLeaseS = 5, kAnnouncementS = 1;
 
 void set_transports(DomainParticipantQos& qos) {
   auto shared_memory = std::make_shared<rtps::SharedMemTransportDescriptor>();
@@ -43,6 +46,14 @@ void set_transports(DomainParticipantQos& qos) {
   udp->receiveBufferSize = kSocketBytes;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports = {shared_memory, udp};
+}
+
+void warn_of_small_buffers() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    const std::string problem = socket_buffer_problem(kSocketBytes);
+    if (!problem.empty()) spdlog::warn("{}", problem);
+  });
 }
 
 template <class Qos>
@@ -107,16 +118,26 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
     if (factory->load_XML_profiles_file(options.profiles_file) != ReturnCode_t::RETCODE_OK) {
       throw InputError(options.profiles_file + ": not a valid file of XML profiles");
     }
+    // Makes the factory look at the profiles again: it did so before this file was there.
+    factory->set_default_participant_qos(PARTICIPANT_QOS_DEFAULT);
   }
   DomainParticipantQos qos;
   factory->get_default_participant_qos(qos);
+  if (qos == PARTICIPANT_QOS_DEFAULT) {  // no profile of an operator
+    auto& discovery = qos.wire_protocol().builtin.discovery_config;
+    discovery.leaseDuration = {kLeaseS, 0};
+    discovery.leaseDuration_announcementperiod = {kAnnouncementS, 0};
+  }
   if (qos.transport().user_transports.empty() && qos.transport().use_builtin_transports) {
     set_transports(qos);
+    warn_of_small_buffers();
   }
   if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
   flow->name = kMapFlow;
-  flow->max_bytes_per_period = kMapBytesPerPeriod;
+  flow->scheduler = rtps::FlowControllerSchedulerPolicy::HIGH_PRIORITY;
+  flow->max_bytes_per_period =
+      static_cast<std::int32_t>(options.map_bytes_per_s * kMapPeriodMs / 1000);
   flow->period_ms = kMapPeriodMs;
   qos.flow_controllers().push_back(flow);
 
@@ -161,13 +182,17 @@ DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& 
     return qos;
   }
   apply(delivery, qos);
-  // The default of 3 s is how long a lost last sample would stay lost. A writer that keeps all is one
-  // whose sender waits for acknowledgements, which readers only give when a heartbeat asks.
+  // The default of 3 s is how long a lost last sample would stay lost. A writer that keeps all is
+  // one whose sender waits for acknowledgements, which readers only give when a heartbeat asks.
   const double heartbeat_s = delivery.keep_last > 0 ? 0.1 : 0.005;
   qos.reliable_writer_qos().times.heartbeatPeriod = eprosima::fastrtps::Duration_t(heartbeat_s);
   qos.publish_mode().kind =
       delivery.background ? ASYNCHRONOUS_PUBLISH_MODE : SYNCHRONOUS_PUBLISH_MODE;
-  if (delivery.background) qos.publish_mode().flow_controller_name = kMapFlow;
+  if (delivery.background) {
+    qos.publish_mode().flow_controller_name = kMapFlow;
+    qos.properties().properties().emplace_back("fastdds.sfc.priority",
+                                               std::to_string(delivery.priority));
+  }
   return qos;
 }
 

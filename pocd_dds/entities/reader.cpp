@@ -72,6 +72,8 @@ bool RawReader::take_raw(void* sample, SampleMeta& meta) {
   meta.disposed = info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
   const eprosima::fastrtps::rtps::octet* key = info.instance_handle.value;
   std::copy(key, key + meta.key.size(), meta.key.begin());
+  const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
+  std::copy(writer, writer + meta.writer.size(), meta.writer.begin());
   return true;
 }
 

@@ -20,6 +20,7 @@ struct SampleMeta {
   /// Key of a keyed sample, as the instance handle has it; our keys are 16 bytes and fit as they
   /// are.
   std::array<std::uint8_t, 16> key{};
+  std::array<std::uint8_t, 16> writer{};  ///< GUID of the one who wrote
 };
 
 /// What does not depend on the type. take() from one thread at a time; the rest is thread-safe.

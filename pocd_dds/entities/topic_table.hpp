@@ -14,6 +14,7 @@ struct Delivery {
   int max_instances = 0;    ///< of keyed topics; 0: not bounded
   bool background = false;  ///< sent by a thread of its own through the map's flow controller
   double deadline_s = 0.0;  ///< 0: none
+  int priority = 0;         ///< among background topics, -10 (first) to 10 (last)
 };
 
 enum class Direction { kIn, kOut, kBoth };
@@ -64,12 +65,12 @@ inline constexpr TopicSpec kMapTiles{"pocd/map/tiles",
                                      "pocd_msgs::msg::dds_::MapTile_",
                                      Direction::kOut,
                                      true,
-                                     {true, true, 1, 0, 0, true, 0}};
+                                     {true, true, 1, 0, 0, true, 0, 0}};
 inline constexpr TopicSpec kMapDeltas{"pocd/map/deltas",
                                       "pocd_msgs::msg::dds_::MapDelta_",
                                       Direction::kOut,
                                       false,
-                                      {true, false, 100, 0, 0, true, 0}};
+                                      {true, false, 1000, 0, 0, true, 0, -5}};
 inline constexpr TopicSpec kMapManifest{"pocd/map/manifest", "pocd_msgs::msg::dds_::MapManifest_",
                                         Direction::kOut, true, latched(1)};
 inline constexpr TopicSpec kSnapshotRequest{"pocd/map/snapshot_request",
@@ -80,7 +81,7 @@ inline constexpr TopicSpec kSnapshotReply{"pocd/map/snapshot_reply",
                                           "pocd_msgs::msg::dds_::MapSnapshotReply_",
                                           Direction::kBoth,
                                           false,
-                                          {true, false, 1000, 0, 0, true, 0}};
+                                          {true, false, 1000, 0, 0, true, 0, 5}};
 inline constexpr TopicSpec kHealth{"pocd/health",
                                    "pocd_msgs::msg::dds_::NodeHealth_",
                                    Direction::kOut,

@@ -66,7 +66,10 @@ bool RawWriter::write_raw(void* sample) {
 }
 
 bool RawWriter::dispose_raw(void* sample) {
-  if (impl_->writer->dispose(sample, HANDLE_NIL) == ReturnCode_t::RETCODE_OK) return true;
+  // Unregistering disposes, too. An instance that is only disposed stays in the history for ever
+  // and counts against max_instances.
+  if (impl_->writer->unregister_instance(sample, HANDLE_NIL) == ReturnCode_t::RETCODE_OK)
+    return true;
   if (failures_.fetch_add(1) == 0) spdlog::error("{}: Fast DDS refused to dispose", topic_);
   return false;
 }

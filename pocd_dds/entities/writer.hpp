@@ -59,7 +59,7 @@ class Writer : public RawWriter {
 
   /// False, counted and logged once when Fast DDS refuses.
   bool write(Sample& sample) { return write_raw(&sample); }
-  /// Says that the instance with this sample's key is gone.
+  /// Says that the instance with this sample's key is gone, and forgets it when all readers know.
   bool dispose(Sample& sample) { return dispose_raw(&sample); }
 };
 

@@ -2,14 +2,14 @@
 
 #include <atomic>
 #include <condition_variable>
-#include <deque>
 #include <mutex>
 #include <random>
 #include <thread>
 #include <tuple>
 
+#include "mirror/catch_up.hpp"
 #include "mirror/part_assembler.hpp"
-#include "pocd/map/map_replica.hpp"
+#include "pocd/map/map_follower.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
@@ -21,12 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 namespace msg = pocd_msgs::msg;
 
-// Deltas and manifest travel on different topics: what is behind for less than this is on its way.
-constexpr std::chrono::milliseconds kPatience{300};
-constexpr std::chrono::milliseconds kAskAgain{2000};
 constexpr std::chrono::milliseconds kIdle{50};
-// Deltas that came before what they build on; a snapshot asked for meanwhile needs the later ones.
-constexpr std::size_t kRecentDeltas = 200;
 
 std::array<std::uint8_t, 16> random_id() {
   std::random_device device;
@@ -35,20 +30,37 @@ std::array<std::uint8_t, 16> random_id() {
   return id;
 }
 
+/// Mirrors of one process that ask for the same share it: a participant costs far more than its
+/// readers.
+std::shared_ptr<dds::Participant> shared_participant(const MirrorOptions& options) {
+  static std::mutex mutex;
+  static std::map<std::tuple<int, std::string, std::string>, std::weak_ptr<dds::Participant>> known;
+  const std::lock_guard<std::mutex> lock(mutex);
+  std::weak_ptr<dds::Participant>& entry =
+      known[{options.domain, options.profiles_file, options.name}];
+  std::shared_ptr<dds::Participant> participant = entry.lock();
+  if (!participant) {
+    participant = std::make_shared<dds::Participant>(
+        dds::BusOptions{options.domain, options.profiles_file, options.name});
+    entry = participant;
+  }
+  return participant;
+}
+
 }  // namespace
 
 struct MapMirror::Impl {
   explicit Impl(const MirrorOptions& given)
       : options(given),
         id(random_id()),
-        participant(std::make_shared<dds::Participant>(
-            dds::BusOptions{given.domain, given.profiles_file, given.name})),
+        participant(shared_participant(given)),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         deltas(participant, dds::topics::kMapDeltas, wakeup),
         replies(participant, dds::topics::kSnapshotReply, wakeup),
         object_states(participant, dds::topics::kObjects, wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
+        plan(given.catch_up),
         thread([this] { run(); }) {}
 
   ~Impl() {
@@ -63,8 +75,10 @@ struct MapMirror::Impl {
   void take_manifests();
   void take_deltas();
   void take_replies();
-  void apply_recent();
-  void ask_if_stale();
+  void forget_objects_of(std::uint64_t epoch);
+  void take_tiles();
+  void catch_up();
+  void ask();
   MirrorStatus status_now() const;
 
   const MirrorOptions options;
@@ -78,18 +92,23 @@ struct MapMirror::Impl {
   dds::Reader<msg::ObjectEventPubSubType> events;
   dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
 
+  // Only while tiles are gathered; by the thread.
+  std::unique_ptr<dds::Reader<msg::MapTilePubSubType>> tiles;
+  std::map<std::array<std::uint8_t, 16>, std::uint64_t> epoch_of_writer;
+  std::map<std::array<std::uint8_t, 16>, TileKey> tile_of_instance;
+  dds::CatchUpPlan plan;
+
   // Guards everything up to the thread.
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
-  MapReplica replica;
+  MapFollower follower;
   std::optional<msg::MapManifest> manifest;
   std::map<std::array<std::uint8_t, 16>, msg::ObjectState> objects;
-  std::deque<MapDelta> recent;
   dds::PartAssembler<std::pair<std::uint64_t, std::uint64_t>, msg::MapDelta> delta_parts;
-  dds::PartAssembler<std::uint32_t, msg::MapSnapshotReply> reply_parts;
-  MirrorStatus counts;
-  std::uint32_t last_request = 0;
-  std::optional<Clock::time_point> stale_since, asked_at;
+  dds::PartAssembler<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>, msg::MapSnapshotReply>
+      reply_parts;
+  std::pair<std::uint64_t, std::uint64_t> last_at{0, 0};
+  std::uint64_t asked = 0, damaged = 0;
 
   std::atomic<bool> stopping{false};
   std::thread thread;
@@ -105,8 +124,8 @@ void MapMirror::Impl::run() {
       take_deltas();
       take_replies();
       take_manifests();
-      apply_recent();
-      ask_if_stale();
+      take_tiles();
+      catch_up();
     }
     changed.notify_all();
   }
@@ -121,6 +140,12 @@ void MapMirror::Impl::take_objects() {
     } else if (meta.disposed) {
       objects.erase(meta.key);
     }
+  }
+}
+
+void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
+  for (auto object = objects.begin(); object != objects.end();) {
+    object = object->second.epoch() == epoch ? objects.erase(object) : std::next(object);
   }
 }
 
@@ -139,9 +164,8 @@ void MapMirror::Impl::take_manifests() {
   dds::SampleMeta meta;
   while (manifests.take(message, meta)) {
     if (!meta.valid || message.map_id() != options.map_id) continue;
-    if (!manifest || manifest->epoch() != message.epoch()) recent.clear();
-    replica.note_published(message.epoch(), message.version(),
-                           dds::digest_from(message.digest()));
+    if (manifest && manifest->epoch() != message.epoch()) forget_objects_of(manifest->epoch());
+    follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
   }
 }
@@ -151,33 +175,14 @@ void MapMirror::Impl::take_deltas() {
   dds::SampleMeta meta;
   while (deltas.take(message, meta)) {
     if (!meta.valid || message.map_id() != options.map_id) continue;
+    if (follower.follows(message.epoch(), message.base_version())) plan.progress(Clock::now());
     const auto parts = delta_parts.add({message.epoch(), message.version()}, message);
     if (!parts) continue;
     std::optional<MapDelta> delta = dds::delta_from(*parts);
-    if (!delta) {
-      ++counts.corrupt;
-      continue;
-    }
-    ++counts.deltas;
-    recent.push_back(std::move(*delta));
-    if (recent.size() > kRecentDeltas) recent.pop_front();
-    apply_recent();
-  }
-}
-
-void MapMirror::Impl::apply_recent() {
-  bool progress = true;
-  while (progress) {
-    progress = false;
-    for (auto delta = recent.begin(); delta != recent.end();) {
-      const DeltaOutcome outcome = replica.apply(*delta);
-      if (outcome == DeltaOutcome::kGap || outcome == DeltaOutcome::kWrongEpoch) {
-        ++delta;
-        continue;
-      }
-      counts.corrupt += outcome == DeltaOutcome::kCorrupt;
-      progress = progress || outcome == DeltaOutcome::kApplied;
-      delta = recent.erase(delta);
+    if (delta) {
+      follower.delta(std::move(*delta));
+    } else {
+      ++damaged;
     }
   }
 }
@@ -186,67 +191,90 @@ void MapMirror::Impl::take_replies() {
   msg::MapSnapshotReply message;
   dds::SampleMeta meta;
   while (replies.take(message, meta)) {
-    if (!meta.valid || message.requester() != id || message.request() != last_request) continue;
-    const auto parts = reply_parts.add(message.request(), message);
+    if (!meta.valid || message.map_id() != options.map_id) continue;
+    // Others ask, too: what this copy has no use for is not kept.
+    if (!follower.needs(dds::snapshot_header(message))) continue;
+    plan.progress(Clock::now());
+    const auto parts =
+        reply_parts.add({message.epoch(), message.version(), message.base_version()}, message);
     if (!parts) continue;
-    // Tiles that the reply does not repeat are those of the copy, if it is of the same run.
-    std::map<TileKey, MapTile> tiles;
-    bool complete = true;
-    for (const auto& part : *parts) {
-      for (const auto& data : part.changed()) {
-        std::optional<MapTile> tile = dds::tile_from(data);
-        complete = complete && tile;
-        if (tile) tiles[tile->key] = std::move(*tile);
-      }
-    }
-    const bool same_run = replica.epoch() == message.epoch();
-    for (const auto& part : *parts) {
-      for (const auto& present : part.present()) {
-        const TileKey key = dds::key_from(present);
-        if (tiles.count(key) > 0) continue;
-        const auto held = replica.tiles().find(key);
-        complete = complete && same_run && held != replica.tiles().end();
-        if (same_run && held != replica.tiles().end()) tiles.insert(*held);
-      }
-    }
-    std::vector<MapTile> list;
-    for (auto& [key, tile] : tiles) list.push_back(std::move(tile));
-    if (complete && replica.replace(message.epoch(), message.version(),
-                                    dds::digest_from(message.digest()), std::move(list))) {
-      ++counts.snapshots_taken;
-      asked_at.reset();
+    std::optional<MapSnapshot> snapshot = dds::snapshot_from(*parts);
+    if (snapshot) {
+      follower.snapshot(std::move(*snapshot));
     } else {
-      ++counts.corrupt;
+      ++damaged;
     }
-    apply_recent();
   }
 }
 
-void MapMirror::Impl::ask_if_stale() {
-  const auto now = Clock::now();
-  const bool stale = manifest && !status_now().in_step;
-  if (!stale) {
-    stale_since.reset();
-    return;
+void MapMirror::Impl::take_tiles() {
+  if (!tiles) return;
+  msg::MapTile message;
+  dds::SampleMeta meta;
+  while (tiles->take(message, meta)) {
+    // One that is new leads on; changes of known ones go on for ever.
+    if (tile_of_instance.count(meta.key) == 0) plan.progress(Clock::now());
+    if (meta.valid) {
+      if (message.map_id() != options.map_id) continue;
+      epoch_of_writer[meta.writer] = message.epoch();
+      tile_of_instance[meta.key] = {message.x(), message.y(), message.z()};
+      std::optional<MapTile> tile = dds::tile_from(message);
+      if (tile) {
+        follower.tile(message.epoch(), std::move(*tile));
+      } else {
+        ++damaged;
+      }
+    } else if (meta.disposed) {
+      const auto epoch = epoch_of_writer.find(meta.writer);
+      const auto tile = tile_of_instance.find(meta.key);
+      if (epoch == epoch_of_writer.end() || tile == tile_of_instance.end()) continue;
+      follower.tile_gone(epoch->second, tile->second);
+    }
   }
-  if (!stale_since) stale_since = now;
-  if (now - *stale_since < kPatience || requests.matched() == 0) return;
-  if (asked_at && now - *asked_at < kAskAgain) return;
-  asked_at = now;
+}
+
+void MapMirror::Impl::catch_up() {
+  const std::pair<std::uint64_t, std::uint64_t> at{follower.replica().epoch().value_or(0),
+                                                   follower.replica().version()};
+  if (at != last_at) plan.progress(Clock::now());
+  last_at = at;
+  const bool stale = manifest && !follower.current() && manifests.matched() > 0;
+  const auto wish = plan.next(Clock::now(), {stale, follower.has_base(), requests.matched() > 0});
+  if (tiles && (!wish.gather || wish.restart)) {
+    tiles.reset();
+    follower.stop_gathering();
+    epoch_of_writer.clear();
+    tile_of_instance.clear();
+  }
+  if (wish.gather && !tiles) {
+    follower.start_gathering();
+    tiles = std::make_unique<dds::Reader<msg::MapTilePubSubType>>(participant,
+                                                                  dds::topics::kMapTiles, wakeup);
+  }
+  if (wish.ask) ask();
+}
+
+void MapMirror::Impl::ask() {
   msg::MapSnapshotRequest request;
   request.requester(id);
-  request.request(++last_request);
   request.map_id(options.map_id);
-  // A copy that does not fit its own digest has nothing to build on.
-  const bool usable = replica.epoch() && counts.corrupt == 0;
-  request.epoch(usable ? *replica.epoch() : 0);
-  request.version(usable ? replica.version() : 0);
+  const bool base = follower.has_base();
+  request.epoch(base ? *follower.replica().epoch() : 0);
+  request.version(base ? follower.replica().version() : 0);
   requests.write(request);
-  ++counts.snapshots_asked;
+  ++asked;
 }
 
 MirrorStatus MapMirror::Impl::status_now() const {
-  MirrorStatus status = counts;
+  MirrorStatus status;
+  const MapReplica& replica = follower.replica();
+  const FollowerCounts& counts = follower.counts();
+  status.deltas = counts.deltas;
+  status.gaps = counts.gaps;
+  status.corrupt = counts.corrupt + damaged;
+  status.snapshots_asked = asked;
+  status.snapshots_taken = counts.snapshots;
+  status.gathered = counts.gathered;
   status.epoch = manifest ? manifest->epoch() : 0;
   status.version = replica.version();
   status.digest = replica.digest();
@@ -256,17 +284,14 @@ MirrorStatus MapMirror::Impl::status_now() const {
   }
   status.publisher_present = manifests.matched() > 0;
   status.publisher_seen = manifests.ever_matched() > 0;
-  // An empty map of version 0 needs no delta: the copy is right from the start.
-  const bool untouched = manifest && manifest->version() == 0 && !replica.epoch();
-  if (!manifest) {
-    status.stale_because = "no publisher heard of yet";
-  } else if (!untouched) {
-    status.stale_because = replica.stale_because();
+  const bool ended =
+      manifest && manifest->final_version() && manifest->version() == replica.version();
+  status.stale_because = follower.stale_because();
+  if (status.stale_because.empty() && !ended && !status.publisher_present) {
+    status.stale_because = "the publisher has gone without ending its run";
   }
   status.in_step = status.stale_because.empty();
-  status.final_version =
-      manifest && manifest->final_version() && status.in_step &&
-      (untouched || manifest->version() == replica.version());
+  status.final_version = ended && status.in_step;
   return status;
 }
 
@@ -282,7 +307,7 @@ MirrorContents MapMirror::contents() const {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   MirrorContents contents;
   contents.status = impl_->status_now();
-  contents.tiles = impl_->replica.tiles();
+  contents.tiles = impl_->follower.replica().tiles();
   if (impl_->manifest) {
     contents.voxel_size_m = impl_->manifest->voxel_size();
     contents.truncation_m = impl_->manifest->truncation();

@@ -1,11 +1,14 @@
 #include "pocd_dds/node/map_publication.hpp"
 
+#include <algorithm>
+
 namespace pocd::dds {
 namespace {
 
 constexpr std::uint32_t kMapId = 0;
 // Small enough that losing one costs little, large enough that a frame's change is a few messages.
 constexpr std::size_t kPartBytes = 256 * 1024;
+constexpr std::chrono::seconds kLongestReply{5};
 
 }  // namespace
 
@@ -35,7 +38,7 @@ void MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
   for (const MapTile& tile : delta->changed) {
     auto message = tile_message(tile, kMapId, delta->epoch);
     tiles_.write(message);
-    bytes_ += tile.payload.size();
+    step_bytes_ += tile.payload.size();
   }
   for (const TileKey& key : delta->removed) {
     auto message = tile_message(MapTile{key, 0, {}}, kMapId, delta->epoch);
@@ -60,17 +63,35 @@ void MapPublication::send_manifest(std::size_t objects, bool final_version) {
   manifest_.write(manifest);
 }
 
-void MapPublication::answer_requests() {
+void MapPublication::answer_requests(bool now) {
   pocd_msgs::msg::MapSnapshotRequest request;
   SampleMeta meta;
   while (requests_.take(request, meta)) {
     if (!meta.valid || request.map_id() != kMapId) continue;
     const bool same_run = request.epoch() == publisher_.epoch();
-    const std::uint64_t newer_than = same_run ? request.version() : 0;
-    for (auto& message : snapshot_messages(publisher_, newer_than, request, kPartBytes)) {
-      replies_.write(message);
-    }
+    const std::uint64_t held = same_run ? std::min(request.version(), publisher_.version()) : 0;
+    wanted_ = wanted_ ? std::min(*wanted_, held) : held;
   }
+  if (!wanted_) return;
+  // A reply goes to all who listen. As long as one is under way, more who ask wait for the next one
+  // together; but not for ever for one who has died.
+  const auto time = std::chrono::steady_clock::now();
+  if (!now && !replies_.wait_acknowledged(std::chrono::milliseconds(0)) &&
+      time - answered_ < kLongestReply) {
+    return;
+  }
+  answered_ = time;
+  ++snapshots_;
+  for (auto& message : snapshot_messages(publisher_, *wanted_, kMapId, kPartBytes)) {
+    for (const auto& tile : message.changed()) snapshot_bytes_ += tile.payload().size();
+    replies_.write(message);
+  }
+  wanted_.reset();
+}
+
+MapTraffic MapPublication::traffic() const {
+  return {publisher_.tiles().size(), publisher_.bytes(), publisher_.area_m2(), step_bytes_,
+          snapshot_bytes_,           snapshots_};
 }
 
 bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {

@@ -3,11 +3,13 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/node_config.hpp"
+#include "pocd_dds/node/status_publication.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
 namespace pocd::dds {
@@ -23,12 +25,13 @@ class MapPublication {
   void send_due(TsdfMap& map, StampNs stamp_ns, bool now);
   /// What the map is; `final_version` at the end of a run.
   void send_manifest(std::size_t objects, bool final_version);
-  void answer_requests();
+  /// One reply for all that wait, when the one before has arrived or `now`.
+  void answer_requests(bool now);
   bool wait_acknowledged(std::chrono::milliseconds time);
 
   const MapPublisher& publisher() const { return publisher_; }
   StampNs stamp_ns() const { return stamp_ns_; }
-  std::uint64_t bytes() const { return bytes_; }
+  MapTraffic traffic() const;
   std::uint64_t failures() const;
 
  private:
@@ -40,7 +43,9 @@ class MapPublication {
   Writer<pocd_msgs::msg::MapSnapshotReplyPubSubType> replies_;
   Reader<pocd_msgs::msg::MapSnapshotRequestPubSubType> requests_;
   StampNs stamp_ns_ = 0;
-  std::uint64_t bytes_ = 0;
+  std::uint64_t step_bytes_ = 0, snapshot_bytes_ = 0, snapshots_ = 0;
+  std::optional<std::uint64_t> wanted_;  // version that subscribers who wait have at least
+  std::chrono::steady_clock::time_point answered_{};
   std::chrono::steady_clock::time_point last_sent_{};
 };
 

@@ -23,12 +23,18 @@ constexpr double kStatusPeriodS = 1.0;
 
 double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
 
+BusOptions bus_options(const NodeOptions& options) {
+  BusOptions bus = options.bus;
+  bus.map_bytes_per_s = static_cast<std::uint32_t>(1e6 * options.config.node.map_rate_mb_s);
+  return bus;
+}
+
 }  // namespace
 
 struct Node::Impl {
   explicit Impl(const NodeOptions& options)
       : config(options.config),
-        participant(std::make_shared<Participant>(options.bus)),
+        participant(std::make_shared<Participant>(bus_options(options))),
         pipeline(config.pipeline),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
@@ -134,7 +140,7 @@ void Node::Impl::send_status(const std::string& state) {
   busy_ms = 0.0;
   busy_frames = 0;
   counts.write_failures = objects.failures() + map.failures() + frames.failures();
-  counts.map_bytes = map.bytes();
+  counts.map = map.traffic();
   counts.map_version = map.publisher().version();
   counts.objects = objects.objects().size();
   map.send_manifest(counts.objects, state == "stopped");
@@ -160,7 +166,7 @@ bool Node::Impl::finish() {
   const auto wait =
       std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
   // A late subscriber that asked for a snapshot just now still gets it.
-  map.answer_requests();
+  map.answer_requests(true);
   const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait) &&
                             frames.wait_acknowledged(wait) && status.wait_acknowledged(wait) &&
                             outputs.wait_acknowledged(wait);
@@ -182,7 +188,7 @@ bool Node::run(const std::atomic<bool>& stop) {
     node.wakeup.wait_for(kPoll);
     {
       const std::lock_guard<std::mutex> lock(node.mutex);
-      node.map.answer_requests();
+      node.map.answer_requests(false);
     }
     const auto now = Clock::now();
     if (seconds(now - status_sent) >= kStatusPeriodS) {

@@ -23,25 +23,37 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
   for (const ObjectId id : result.retired) {
     objects_.erase(id);
     changed_.erase(id);
-    if (published_.erase(id) == 0) continue;
-    pocd_msgs::msg::ObjectState gone;
-    gone.uuid(object_uuid(epoch_, id));
-    states_.dispose(gone);
+    if (published_.erase(id) > 0) gone_.insert(id);
+  }
+  dispose_gone();
+}
+
+void ObjectPublication::dispose_gone() {
+  for (auto id = gone_.begin(); id != gone_.end();) {
+    pocd_msgs::msg::ObjectState state;
+    state.uuid(object_uuid(epoch_, *id));
+    id = states_.dispose(state) ? gone_.erase(id) : std::next(id);
   }
 }
 
 void ObjectPublication::send_due(bool now) {
-  if (changed_.empty()) return;
+  if (changed_.empty() && gone_.empty()) return;
   const auto time = std::chrono::steady_clock::now();
   if (!now && std::chrono::duration<double>(time - last_sent_).count() < node_.object_period_s) {
     return;
   }
   last_sent_ = time;
-  for (const ObjectId id : changed_) {
-    auto message = object_message(objects_.at(id), epoch_, classes_, stamp_ns_, node_.map_frame);
-    if (states_.write(message)) published_.insert(id);
+  // What Fast DDS refuses, because the writer is full, is tried again next time.
+  dispose_gone();
+  for (auto id = changed_.begin(); id != changed_.end();) {
+    auto message = object_message(objects_.at(*id), epoch_, classes_, stamp_ns_, node_.map_frame);
+    if (!states_.write(message)) {
+      ++id;
+      continue;
+    }
+    published_.insert(*id);
+    id = changed_.erase(id);
   }
-  changed_.clear();
 }
 
 bool ObjectPublication::wait_acknowledged(std::chrono::milliseconds time) {

@@ -29,13 +29,15 @@ class ObjectPublication {
   std::uint64_t failures() const { return states_.failures() + events_.failures(); }
 
  private:
+  void dispose_gone();
+
   const NodeConfig node_;
   const ClassMap classes_;
   const std::uint64_t epoch_;
   Writer<pocd_msgs::msg::ObjectStatePubSubType> states_;
   Writer<pocd_msgs::msg::ObjectEventPubSubType> events_;
   std::map<ObjectId, ObjectSnapshot> objects_;
-  std::set<ObjectId> changed_, published_;
+  std::set<ObjectId> changed_, published_, gone_;
   StampNs stamp_ns_ = 0;
   std::chrono::steady_clock::time_point last_sent_{};
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 
 #include "pocd_dds/bridge/conversions.hpp"
 
@@ -46,6 +47,12 @@ void add_memory(diagnostic_msgs::msg::DiagnosticStatus& status, const MapMemoryS
   add(status, "map regions the disk did not take", std::to_string(memory.write_failures));
   add(status, "map blocks lost", std::to_string(memory.blocks_lost));
   add(status, "frames over the map memory budget", std::to_string(memory.frames_over_budget));
+}
+
+std::string fixed(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.1f", value);
+  return text;
 }
 
 /// The node's instance in pocd/health: its epoch, which no other node has.
@@ -125,7 +132,18 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   add(node, "processing [ms per frame]", std::to_string(work.processing_ms));
   add(node, "objects", std::to_string(work.objects));
   add(node, "map version", std::to_string(work.map_version));
-  add(node, "map bytes published", std::to_string(work.map_bytes));
+  add(node, "map tiles", std::to_string(work.map.tiles));
+  add(node, "map area [m2]", fixed(work.map.area_m2));
+  add(node, "map bytes per m2",
+      fixed(work.map.area_m2 > 0 ? static_cast<double>(work.map.bytes) / work.map.area_m2 : 0.0));
+  const std::uint64_t map_bytes = work.map.step_bytes + work.map.snapshot_bytes;
+  const auto now = std::chrono::steady_clock::now();
+  const double elapsed_s = std::chrono::duration<double>(now - sent_).count();
+  add(node, "map bytes per second", fixed(static_cast<double>(map_bytes - map_bytes_) / elapsed_s));
+  add(node, "map bytes published", std::to_string(map_bytes));
+  add(node, "map bytes in snapshots", std::to_string(work.map.snapshot_bytes));
+  map_bytes_ = map_bytes;
+  sent_ = now;
   if (!work.last_warning.empty()) add(node, "last warning", work.last_warning);
   diagnostics.status().insert(diagnostics.status().begin(), node);
   health_.write(health);

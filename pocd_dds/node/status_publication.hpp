@@ -14,13 +14,23 @@
 
 namespace pocd::dds {
 
+/// The published map and what it costs.
+struct MapTraffic {
+  std::size_t tiles = 0;
+  std::size_t bytes = 0;                             ///< of all tiles that there are
+  double area_m2 = 0.0;                              ///< of floor that tiles stand on
+  std::uint64_t step_bytes = 0, snapshot_bytes = 0;  ///< payload sent since the start
+  std::uint64_t snapshots = 0;
+};
+
 /// What the worker knows.
 struct WorkStatus {
   std::uint64_t processed = 0, refused = 0, warnings = 0;
   double processing_ms = 0.0;  ///< mean of the last second, 0 without frames
   std::string last_warning;
   std::uint64_t write_failures = 0;
-  std::uint64_t map_bytes = 0, map_version = 0, objects = 0;
+  std::uint64_t map_version = 0, objects = 0;
+  MapTraffic map;
   MapMemoryStatus memory;
   StampNs stamp_ns = 0;  ///< of the last frame
 };
@@ -41,6 +51,8 @@ class StatusPublication {
  private:
   std::string name_;
   std::uint64_t epoch_;
+  std::uint64_t map_bytes_ = 0;  // sent at the time of the status before
+  std::chrono::steady_clock::time_point sent_{};
   Writer<pocd_msgs::msg::NodeHealthPubSubType> health_;
   std::unique_ptr<Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType>> diagnostics_;
   double diagnostics_period_s_ = 0.0;

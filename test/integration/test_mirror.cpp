@@ -25,7 +25,8 @@ TEST(Mirror, LateJoinerConvergesToTheSameDigest) {
   MapMirror late(on(domain));
   // Both follow to the very end of the run, whatever the node still had in its queue.
   ASSERT_TRUE(late.wait_until(whole, kGenerous));
-  EXPECT_GT(late.status().snapshots_taken, 0u) << "deltas alone cannot have made this copy";
+  EXPECT_GT(late.status().snapshots_taken + late.status().gathered, 0u)
+      << "deltas alone cannot have made this copy";
   node.signal(SIGINT);
   const auto finished = [](const MirrorStatus& status) { return status.final_version; };
   ASSERT_TRUE(early.wait_until(finished, kGenerous)) << early.status().stale_because;
@@ -47,6 +48,10 @@ TEST(Mirror, NewRunAfterAKilledPublisherIsNoticedAndTakenOver) {
     EXPECT_EQ(mirror.status().epoch, 1u);
     node.signal(SIGKILL);
     EXPECT_EQ(node.wait().exit_code, 128 + SIGKILL);
+    // Noticed when the lease is over, although no word was said.
+    ASSERT_TRUE(
+        mirror.wait_until([](const MirrorStatus& status) { return !status.in_step; }, kGenerous));
+    EXPECT_EQ(mirror.status().stale_because, "the publisher has gone without ending its run");
   }
   Process node(node_command(domain, {"--lossless", "--epoch", "2"}));
   ASSERT_EQ(run_command(play_command(domain, {"--max-frames", "60"})).exit_code, 0);

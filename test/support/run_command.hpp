@@ -79,6 +79,7 @@ class Process {
     return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            info.si_pid == 0;
   }
+  pid_t pid() const { return pid_; }
 
   CommandResult wait() {
     int status = 0;

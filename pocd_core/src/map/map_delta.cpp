@@ -73,6 +73,11 @@ void subtract(MapDigest& sum, const MapDigest& term) {
 MapPublisher::MapPublisher(std::uint64_t epoch, const TsdfConfig& config)
     : epoch_(epoch), config_(config) {}
 
+double MapPublisher::area_m2() const {
+  const double side_m = kTileSide * config_.voxel_size_m;
+  return static_cast<double>(columns_.size()) * side_m * side_m;
+}
+
 std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
   MapDelta delta;
   delta.epoch = epoch_;
@@ -91,13 +96,21 @@ std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
     std::vector<std::uint8_t> payload = payload_of(key);
     const auto known = tiles_.find(key);
     if (known == tiles_.end() ? payload.empty() : known->second.payload == payload) continue;
-    if (known != tiles_.end()) subtract(digest_, tile_digest(key, known->second.payload));
+    if (known != tiles_.end()) {
+      subtract(digest_, tile_digest(key, known->second.payload));
+      bytes_ -= known->second.payload.size();
+    } else {
+      ++columns_[{key.x, key.y}];
+    }
     if (payload.empty()) {
       tiles_.erase(known);
+      const auto column = columns_.find({key.x, key.y});
+      if (--column->second == 0) columns_.erase(column);
       delta.removed.push_back(key);
       continue;
     }
     add(digest_, tile_digest(key, payload));
+    bytes_ += payload.size();
     MapTile tile{key, delta.version, std::move(payload)};
     delta.changed.push_back(tile);
     tiles_[key] = std::move(tile);

@@ -14,18 +14,28 @@
 
 namespace pocd {
 
+/// How a copy that is behind becomes the publisher's map again.
+enum class CatchUp {
+  kEither,  ///< from the tiles that the bus keeps for late joiners, or by a snapshot; both if need
+            ///< be
+  kTiles,   ///< from the tiles only: also from a recording, which answers no request
+  kSnapshot,  ///< by asking the publisher only
+};
+
 struct MirrorOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd_mirror";
   std::uint32_t map_id = 0;
+  CatchUp catch_up = CatchUp::kEither;
   /// Called for every event in order, by the mirror's thread, with the name of the object's class.
   /// Events from before the mirror joined are not repeated.
   std::function<void(const ObjectEvent&, const std::string& class_name)> on_event;
 };
 
 struct MirrorStatus {
-  /// The copy equals the published map at the newest version heard of, proven by the digest.
+  /// The copy equals the published map at the newest version heard of, proven by the digest, and
+  /// the publisher is there or has ended its run in order.
   bool in_step = false;
   std::string stale_because;  ///< empty when in step
   std::uint64_t epoch = 0;    ///< run of the publisher; 0: none heard of
@@ -36,7 +46,9 @@ struct MirrorStatus {
   bool publisher_present = false;
   bool publisher_seen = false;  ///< at any time
   bool final_version = false;   ///< the publisher has ended its run in order, at this version
-  std::uint64_t deltas = 0, gaps = 0, corrupt = 0, snapshots_asked = 0, snapshots_taken = 0;
+  std::uint64_t deltas = 0, gaps = 0, corrupt = 0;
+  std::uint64_t snapshots_asked = 0, snapshots_taken = 0;
+  std::uint64_t gathered = 0;  ///< times that the copy was made of single tiles
 };
 
 struct MirrorContents {
@@ -45,12 +57,12 @@ struct MirrorContents {
   double truncation_m = 0.0;
   std::string frame_id;
   std::map<TileKey, MapTile> tiles;
-  std::vector<ObjectSnapshot> objects;  ///< by id
+  std::vector<ObjectSnapshot> objects;         ///< by id
   std::map<ClassId, std::string> class_names;  ///< of the objects
 };
 
-/// Follows the deltas with a thread of its own, from construction on. When it joins late or has missed
-/// something, it asks the publisher for a snapshot. Thread-safe.
+/// Follows the deltas with a thread of its own, from construction on. When it joins late, has
+/// missed something, or the publisher has started anew, it catches up as CatchUp says. Thread-safe.
 class MapMirror {
  public:
   /// Throws InputError when the bus cannot be used.

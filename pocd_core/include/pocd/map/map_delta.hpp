@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "pocd/map/tsdf_map.hpp"
@@ -69,6 +71,10 @@ class MapPublisher {
   std::uint64_t epoch() const { return epoch_; }
   std::uint64_t version() const { return version_; }
   MapDigest digest() const { return digest_; }
+  /// Of all payloads together.
+  std::size_t bytes() const { return bytes_; }
+  /// Floor that tiles stand on: columns of tiles times their area [m^2].
+  double area_m2() const;
   const std::map<TileKey, MapTile>& tiles() const { return tiles_; }
 
  private:
@@ -77,6 +83,8 @@ class MapPublisher {
   std::uint64_t version_ = 0;
   MapDigest digest_;
   std::map<TileKey, MapTile> tiles_;
+  std::size_t bytes_ = 0;
+  std::map<std::pair<std::int32_t, std::int32_t>, int> columns_;  // tiles above each other
 };
 
 /// Digest contribution of one tile.

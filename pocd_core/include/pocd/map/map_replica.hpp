@@ -43,6 +43,7 @@ class MapReplica {
   bool current() const { return stale_because().empty(); }
 
   std::optional<std::uint64_t> epoch() const { return epoch_; }
+  bool corrupt() const { return corrupt_; }  ///< holds what does not fit its digest
   std::uint64_t version() const { return version_; }
   MapDigest digest() const { return digest_; }
   const std::map<TileKey, MapTile>& tiles() const { return tiles_; }

@@ -1,0 +1,89 @@
+// A map that changes at random and is published by the node's own code, in the test's process.
+#pragma once
+
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "bus_harness.hpp"
+#include "pocd/common/random.hpp"
+#include "pocd/map/tsdf_map.hpp"
+#include "pocd_dds/entities/writer.hpp"
+#include "pocd_dds/node/map_publication.hpp"
+
+namespace pocd {
+
+/// Participants of one process talk as those of several do, from here on: Fast DDS would hand
+/// samples over directly, past transports and flow control.
+inline void talk_over_the_bus() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
+/// Blocks of noise, which hardly compress: a tile has some 4 KB per block.
+inline void fill_block(TsdfMap& map, const BlockKey& key, Random& random) {
+  VoxelBlock& block = map.touch(key);
+  for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
+    block.tsdf[i] = static_cast<std::int16_t>(static_cast<int>(random.below(60000)) - 30000);
+    block.weight[i] = 10;
+    block.owner[i] = 1 + static_cast<std::uint32_t>(random.below(3));
+  }
+}
+
+/// Not thread-safe, except history_at().
+class MapSource {
+ public:
+  MapSource(const TestDomain& domain, std::uint64_t epoch, std::uint32_t bytes_per_s,
+            const std::string& profiles_file = "")
+      : map(TsdfConfig{}),
+        random(epoch),
+        participant(make(domain, bytes_per_s, profiles_file)),
+        publication(participant, dds::NodeFile{}, epoch, wakeup) {}
+
+  /// Changes some blocks of a map of at most `size`^2 columns of tiles, removes some, publishes.
+  void step(int size) {
+    const auto cell = [&] { return static_cast<std::int32_t>(random.below(2 * size)); };
+    for (int i = 0; i < 4; ++i) fill_block(map, {cell(), cell(), 0}, random);
+    if (random.uniform() < 0.3) map.clear_object(ObjectId{1});
+    if (random.uniform() < 0.1) {
+      // A block without owners is empty to the publisher.
+      const BlockKey key{cell(), cell(), 0};
+      if (map.find(key)) map.touch(key).weight.fill(0);
+    }
+    publish();
+  }
+  void publish() {
+    const std::lock_guard<std::mutex> lock(mutex_);  // before anybody can have the new version
+    publication.send_due(map, 1, true);
+    history_[publication.publisher().version()] = publication.publisher().digest();
+  }
+  MapDigest history_at(std::uint64_t version) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return history_.at(version);
+  }
+
+  TsdfMap map;
+  Random random;
+  dds::Wakeup wakeup;
+  std::shared_ptr<dds::Participant> participant;
+  dds::MapPublication publication;
+
+ private:
+  static std::shared_ptr<dds::Participant> make(const TestDomain& domain, std::uint32_t rate,
+                                                const std::string& profiles_file) {
+    talk_over_the_bus();
+    dds::BusOptions options{domain.number(), profiles_file, "pocd_test"};
+    options.map_bytes_per_s = rate;
+    return std::make_shared<dds::Participant>(options);
+  }
+  mutable std::mutex mutex_;
+  std::map<std::uint64_t, MapDigest> history_{{0, MapDigest{}}};
+};
+
+}  // namespace pocd

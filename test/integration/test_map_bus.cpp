@@ -1,0 +1,205 @@
+// The published map on a real bus: many late joiners, and what the flow control is for.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+
+#include "map_source.hpp"
+#include "pocd/map/map_replica.hpp"
+#include "pocd_dds/map_mirror.hpp"
+
+namespace pocd {
+namespace {
+
+/// Publishes a changing map from a thread of its own.
+class ChangingMap {
+ public:
+  ChangingMap(const TestDomain& domain, std::uint64_t epoch)
+      : source(domain, epoch, dds::kMapBytesPerS), thread_([this] { run(); }) {}
+  ~ChangingMap() {
+    stopping_ = true;
+    thread_.join();
+  }
+  std::uint64_t steps() const { return steps_; }
+  MapSource source;
+
+ private:
+  void run() {
+    while (!stopping_) {
+      source.wakeup.wait_for(std::chrono::milliseconds(20));
+      source.publication.answer_requests(false);
+      source.step(6);
+      if (steps_++ % 10 == 0) source.publication.send_manifest(0, false);
+    }
+  }
+  std::atomic<std::uint64_t> steps_{0};
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+bool whole(const MirrorStatus& status) { return status.in_step && status.version > 0; }
+
+// 200 subscribers in waves, each at a random moment of a map that never rests, by all means of
+// catching up. Each gets to a copy that is proven to be the publisher's at that version.
+TEST(MapBus, TwoHundredLateJoinersConverge) {
+  constexpr int kWaves = 10, kPerWave = 20;
+  const TestDomain domain;
+  ChangingMap map(domain, 11);
+  Random random(2024);
+  std::uint64_t gathered = 0, snapshots = 0;
+  for (int wave = 0; wave < kWaves; ++wave) {
+    std::vector<std::unique_ptr<MapMirror>> mirrors;
+    for (int i = 0; i < kPerWave; ++i) {
+      const std::uint64_t moment = map.steps() + random.below(3);
+      ASSERT_TRUE(eventually([&] { return map.steps() >= moment; }));
+      MirrorOptions options;
+      options.domain = domain.number();
+      options.name = "wave" + std::to_string(wave);  // one participant for each wave
+      options.catch_up = std::array{CatchUp::kEither, CatchUp::kTiles, CatchUp::kSnapshot}[i % 3];
+      mirrors.push_back(std::make_unique<MapMirror>(options));
+    }
+    for (int i = 0; i < kPerWave; ++i) {
+      const MapMirror& mirror = *mirrors[i];
+      MirrorContents contents;
+      // The map goes on; what counts is a moment at which the copy says that it is right.
+      ASSERT_TRUE(
+          mirror.wait_until([&](const MirrorStatus& status) { return whole(status); }, kGenerous))
+          << "wave " << wave << " mirror " << i << ": " << mirror.status().stale_because;
+      contents = mirror.contents();
+      std::vector<MapTile> tiles;
+      for (const auto& entry : contents.tiles) tiles.push_back(entry.second);
+      ASSERT_EQ(map_digest(tiles), contents.status.digest);
+      ASSERT_EQ(contents.status.digest, map.source.history_at(contents.status.version));
+      gathered += contents.status.gathered;
+      snapshots += contents.status.snapshots_taken;
+    }
+  }
+  EXPECT_GE(gathered, static_cast<std::uint64_t>(kWaves * kPerWave / 3));
+  EXPECT_GE(snapshots, static_cast<std::uint64_t>(kWaves * kPerWave / 4));
+}
+
+// A map of several megabytes leaves at 1 MB/s for a late joiner. What is written when its first
+// tile has arrived comes before its last one: an event, because events do not pass the flow
+// control, and a delta, because it goes first there.
+TEST(MapBus, EventsAndDeltasOvertakeTheTiles) {
+  const TestDomain domain;
+  MapSource source(domain, 5, 1'000'000);
+  for (int x = 0; x < 40; ++x) {
+    for (int y = 0; y < 40; ++y) fill_block(source.map, {x, y, 0}, source.random);
+  }
+  source.publish();
+  const std::size_t all = source.publication.publisher().tiles().size();
+  ASSERT_GT(source.publication.publisher().bytes(), 500'000u);
+  dds::Writer<pocd_msgs::msg::ObjectEventPubSubType> events(source.participant,
+                                                            dds::topics::kObjectEvents);
+  const auto subscriber = test_participant(domain);
+  dds::Wakeup wakeup;
+  dds::Reader<pocd_msgs::msg::ObjectEventPubSubType> event_reader(
+      subscriber, dds::topics::kObjectEvents, wakeup);
+  dds::Reader<pocd_msgs::msg::MapDeltaPubSubType> delta_reader(subscriber, dds::topics::kMapDeltas,
+                                                               wakeup);
+  ASSERT_TRUE(eventually([&] { return events.matched() > 0 && delta_reader.matched() > 0; }));
+  // Volatile writers have to know their readers; the step before the tiles are asked for shows that
+  // they do.
+  ASSERT_TRUE(eventually([&] {
+    fill_block(source.map, {0, 0, 0}, source.random);
+    source.publish();
+    pocd_msgs::msg::MapDelta delta;
+    dds::SampleMeta meta;
+    return delta_reader.take(delta, meta);
+  }));
+  dds::Reader<pocd_msgs::msg::MapTilePubSubType> tile_reader(subscriber, dds::topics::kMapTiles,
+                                                             wakeup);
+  std::set<std::array<std::uint8_t, 16>> tiles;
+  std::optional<std::size_t> before_event, before_delta;
+  const std::uint64_t last = source.publication.publisher().version() + 1;
+  bool written = false;
+  const bool complete = eventually([&] {
+    dds::SampleMeta meta;
+    pocd_msgs::msg::ObjectEvent event;
+    if (event_reader.take(event, meta) && !before_event) before_event = tiles.size();
+    pocd_msgs::msg::MapDelta delta;
+    while (delta_reader.take(delta, meta)) {
+      if (delta.version() == last && !before_delta) before_delta = tiles.size();
+    }
+    pocd_msgs::msg::MapTile tile;
+    while (tile_reader.take(tile, meta)) tiles.insert(meta.key);
+    if (!tiles.empty() && !written) {
+      written = true;
+      pocd_msgs::msg::ObjectEvent sent;
+      events.write(sent);
+      fill_block(source.map, {1, 1, 0}, source.random);
+      source.publish();
+    }
+    return tiles.size() == all && before_event && before_delta;
+  });
+  ASSERT_TRUE(complete) << tiles.size() << " of " << all << " tiles";
+  EXPECT_LT(*before_event, all);
+  EXPECT_LT(*before_delta, all);
+}
+
+// Objects and tiles come and go for as long as a node runs; a writer must not count the dead.
+TEST(MapBus, RemovedInstancesMakeRoom) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Delivery few = dds::topics::kObjects.delivery;
+  few.max_instances = 40;
+  dds::Writer<pocd_msgs::msg::ObjectStatePubSubType> writer(bus, dds::topics::kObjects,
+                                                            dds::topics::kObjects.name, few);
+  const auto add_and_remove = [&](int from, int to) {
+    pocd_msgs::msg::ObjectState state;
+    for (int i = from; i < to; ++i) {
+      state.uuid(dds::object_uuid(1, static_cast<ObjectId>(i)));
+      ASSERT_TRUE(writer.write(state)) << i;
+      if (i - 20 < from) continue;
+      state.uuid(dds::object_uuid(1, static_cast<ObjectId>(i - 20)));
+      ASSERT_TRUE(writer.dispose(state)) << i;
+      // An instance is forgotten when all readers know of its end.
+      if (i % 10 == 0) {
+        ASSERT_TRUE(writer.wait_acknowledged(kGenerous));
+      }
+    }
+  };
+  add_and_remove(1, 1001);  // nobody listens
+  dds::Wakeup wakeup;
+  dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> reader(
+      test_participant(domain), dds::topics::kObjects, dds::topics::kObjects.name, few, wakeup);
+  std::set<std::array<std::uint8_t, 16>> present;
+  const auto take = [&] {
+    pocd_msgs::msg::ObjectState state;
+    dds::SampleMeta meta;
+    while (reader.take(state, meta)) {
+      if (meta.valid) present.insert(meta.key);
+      if (meta.disposed) present.erase(meta.key);
+    }
+  };
+  ASSERT_TRUE(eventually([&] {
+    take();
+    return present.size() == 20;
+  })) << "what is there when one joins: "
+      << present.size();
+  std::atomic<bool> done{false};
+  std::thread consumer([&] {
+    while (!done) {
+      wakeup.wait_for(std::chrono::milliseconds(20));
+      take();
+    }
+  });
+  for (int i = 981; i < 1001; ++i) {
+    pocd_msgs::msg::ObjectState state;
+    state.uuid(dds::object_uuid(1, static_cast<ObjectId>(i)));
+    writer.dispose(state);
+  }
+  EXPECT_TRUE(writer.wait_acknowledged(kGenerous));
+  add_and_remove(2001, 3001);
+  EXPECT_TRUE(writer.wait_acknowledged(kGenerous));
+  done = true;
+  wakeup.wake();
+  consumer.join();
+  take();
+  EXPECT_EQ(present.size(), 20u);
+  EXPECT_EQ(writer.failures(), 0u);
+}
+
+}  // namespace
+}  // namespace pocd

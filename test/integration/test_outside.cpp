@@ -1,0 +1,32 @@
+// An application that is no part of this repository, built against what is installed.
+#include <gtest/gtest.h>
+
+#include "bus_harness.hpp"
+
+namespace pocd {
+namespace {
+
+TEST(Outside, ExampleBuildsAgainstTheInstalledPackageAndFollowsTheMap) {
+  const TemporaryFolder folder;
+  const std::string build = (folder.path() / "build").string();
+  const CommandResult configured =
+      run_command({POCD_CMAKE, "-S", source("pocd_dds/examples/map_mirror"), "-B", build, "-G",
+                   POCD_GENERATOR, std::string("-DCMAKE_PREFIX_PATH=") + POCD_BIN_DIR + "/.."});
+  ASSERT_EQ(configured.exit_code, 0) << configured.out << configured.err;
+  const CommandResult built = run_command({POCD_CMAKE, "--build", build});
+  ASSERT_EQ(built.exit_code, 0) << built.out << built.err;
+
+  const TestDomain domain;
+  Process node(node_command(domain, {"--lossless"}));
+  ASSERT_EQ(run_command(play_command(domain, {"--max-frames", "40"})).exit_code, 0);
+  const CommandResult followed =
+      run_command({build + "/follow_map", domain.text(), "100", "100", "100"});
+  EXPECT_EQ(followed.exit_code, 0) << followed.out << followed.err;
+  EXPECT_NE(followed.out.find("that place is not near any surface"), std::string::npos)
+      << followed.out;
+  node.signal(SIGINT);
+  EXPECT_EQ(node.wait().exit_code, 0);
+}
+
+}  // namespace
+}  // namespace pocd

@@ -1,0 +1,80 @@
+// What an operator's XML profiles replace, and the check of the machine's socket buffers.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "bus_harness.hpp"
+#include "pocd_dds/entities/socket_buffers.hpp"
+
+namespace pocd {
+namespace {
+
+using namespace eprosima::fastdds::dds;  // NOLINT: settings of Fast DDS are the subject
+
+TEST(Profiles, ReplaceParticipantReadersAndWriters) {
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "profiles.xml";
+  std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <transport_descriptors>
+    <transport_descriptor><transport_id>small_udp</transport_id><type>UDPv4</type>
+      <maxMessageSize>8972</maxMessageSize></transport_descriptor>
+  </transport_descriptors>
+  <participant profile_name="operator" is_default_profile="true"><rtps>
+    <name>named_by_the_operator</name>
+    <builtin><discovery_config><leaseDuration><sec>17</sec></leaseDuration></discovery_config></builtin>
+    <userTransports><transport_id>small_udp</transport_id></userTransports>
+    <useBuiltinTransports>false</useBuiltinTransports>
+  </rtps></participant>
+  <data_writer profile_name="pocd/object_events"><historyMemoryPolicy>DYNAMIC</historyMemoryPolicy>
+    <topic><historyQos><kind>KEEP_LAST</kind><depth>77</depth></historyQos></topic>
+    <times><heartbeatPeriod><sec>2</sec></heartbeatPeriod></times></data_writer>
+  <data_reader profile_name="rt/robot1/depth/image_raw">
+    <qos><reliability><kind>RELIABLE</kind></reliability></qos></data_reader>
+</profiles>)";
+  const auto find = [](const DomainParticipantQos& qos) {
+    return qos.wire_protocol().builtin.discovery_config.leaseDuration.seconds;
+  };
+  {
+    const dds::Participant plain({domain.number(), "", "plain"});
+    DomainParticipantQos qos;
+    plain.get()->get_qos(qos);
+    EXPECT_EQ(std::string(qos.name().c_str()), "plain");
+    EXPECT_EQ(find(qos), 5) << "a process that dies is noticed soon";
+    EXPECT_EQ(qos.transport().user_transports.size(), 2u);
+  }
+  const dds::Participant participant({domain.number(), file.string(), "ours"});
+  DomainParticipantQos qos;
+  participant.get()->get_qos(qos);
+  EXPECT_EQ(std::string(qos.name().c_str()), "named_by_the_operator");
+  EXPECT_EQ(find(qos), 17);
+  ASSERT_EQ(qos.transport().user_transports.size(), 1u);
+  EXPECT_EQ(qos.transport().user_transports[0]->max_message_size(), 8972u);
+
+  const auto& events = dds::topics::kObjectEvents;
+  const DataWriterQos writer = participant.writer_qos(events.name, events.delivery);
+  EXPECT_EQ(writer.history().depth, 77);
+  EXPECT_EQ(writer.reliable_writer_qos().times.heartbeatPeriod.seconds, 2);
+  EXPECT_EQ(participant.reader_qos(events.name, events.delivery).history().depth, 1000)
+      << "a profile for writers is none for readers";
+  const auto& depth = dds::topics::kDepth;
+  EXPECT_EQ(participant.reader_qos("rt/robot1/depth/image_raw", depth.delivery).reliability().kind,
+            RELIABLE_RELIABILITY_QOS);
+  EXPECT_EQ(participant.reader_qos("rt/robot2/depth/image_raw", depth.delivery).reliability().kind,
+            BEST_EFFORT_RELIABILITY_QOS);
+  const auto& tiles = dds::topics::kMapTiles;
+  EXPECT_EQ(participant.writer_qos(tiles.name, tiles.delivery).publish_mode().kind,
+            ASYNCHRONOUS_PUBLISH_MODE)
+      << "topics without a profile stay as the table has them";
+}
+
+TEST(SocketBuffers, SayWhatToSetWhenTheyAreSmall) {
+  EXPECT_EQ(dds::socket_buffer_problem(4096), "");
+  const std::string problem = dds::socket_buffer_problem(1 << 30);
+  EXPECT_NE(problem.find("sysctl -w net.core.rmem_max=1073741824"), std::string::npos) << problem;
+  EXPECT_NE(problem.find("sysctl -w net.core.wmem_max=1073741824"), std::string::npos) << problem;
+}
+
+}  // namespace
+}  // namespace pocd
