@@ -149,7 +149,6 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   health_.write(health);
   if (!diagnostics_) return;
   // Health keeps its own rhythm of about a second, so the first one that is not much too early.
-  const auto now = std::chrono::steady_clock::now();
   const double since_s = std::chrono::duration<double>(now - diagnostics_sent_).count();
   if (since_s < diagnostics_period_s_ - 0.5 && state == "running") return;
   diagnostics_sent_ = now;

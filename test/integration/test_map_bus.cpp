@@ -163,7 +163,8 @@ TEST(MapBus, RemovedInstancesMakeRoom) {
   add_and_remove(1, 1001);  // nobody listens
   dds::Wakeup wakeup;
   dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> reader(
-      test_participant(domain), dds::topics::kObjects, dds::topics::kObjects.name, few, wakeup);
+      test_participant(domain), dds::topics::kObjects, dds::topics::kObjects.name,
+      dds::topics::kObjects.delivery, wakeup);
   std::set<std::array<std::uint8_t, 16>> present;
   const auto take = [&] {
     pocd_msgs::msg::ObjectState state;
