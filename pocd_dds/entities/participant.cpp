@@ -33,8 +33,7 @@ constexpr std::uint32_t kSocketBytes = 4u << 20;
 constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbers overflow
 
 // The name has to outlive every participant.
-constexpr const char* kMapFlow = "pocd_map_flow";
-constexpr std::uint64_t kMapPeriodMs = 50;
+constexpr const char* kBackground = "pocd_background";
 // A process that dies without a word is noticed after this time; the default is 20 s.
 constexpr std::int32_t kLeaseS = 5, kAnnouncementS = 1;
 
@@ -134,11 +133,8 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   }
   if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
-  flow->name = kMapFlow;
-  flow->scheduler = rtps::FlowControllerSchedulerPolicy::HIGH_PRIORITY;
-  flow->max_bytes_per_period =
-      static_cast<std::int32_t>(options.map_bytes_per_s * kMapPeriodMs / 1000);
-  flow->period_ms = kMapPeriodMs;
+  flow->name = kBackground;
+  flow->max_bytes_per_period = 0;  // no limit: one that limits can block the process
   qos.flow_controllers().push_back(flow);
 
   impl_->participant =
@@ -189,9 +185,7 @@ DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& 
   qos.publish_mode().kind =
       delivery.background ? ASYNCHRONOUS_PUBLISH_MODE : SYNCHRONOUS_PUBLISH_MODE;
   if (delivery.background) {
-    qos.publish_mode().flow_controller_name = kMapFlow;
-    qos.properties().properties().emplace_back("fastdds.sfc.priority",
-                                               std::to_string(delivery.priority));
+    qos.publish_mode().flow_controller_name = kBackground;
   }
   return qos;
 }

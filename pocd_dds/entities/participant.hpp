@@ -13,17 +13,12 @@
 
 namespace pocd::dds {
 
-/// 80 Mbit/s: half of what a wireless link of a robot carries.
-constexpr std::uint32_t kMapBytesPerS = 10'000'000;
-
 struct BusOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd";
   /// Hears of everything that is discovered, from the first moment; must outlive the participant.
   eprosima::fastdds::dds::DomainParticipantListener* listener = nullptr;
-  /// Map data leaves at most at this rate, so that nothing else queues behind it.
-  std::uint32_t map_bytes_per_s = kMapBytesPerS;
 };
 
 /// ROS_DOMAIN_ID, or 0 when it is not set. Throws InputError when it is no domain.

@@ -12,9 +12,8 @@ struct Delivery {
   int keep_last = 1;        ///< 0: keep all, bounded by max_samples
   int max_samples = 0;      ///< 0: not bounded
   int max_instances = 0;    ///< of keyed topics; 0: not bounded
-  bool background = false;  ///< sent by a thread of its own through the map's flow controller
+  bool background = false;  ///< sent, and sent again, by a thread of its own
   double deadline_s = 0.0;  ///< 0: none
-  int priority = 0;         ///< among background topics, -10 (first) to 10 (last)
 };
 
 enum class Direction { kIn, kOut, kBoth };
@@ -65,12 +64,9 @@ inline constexpr TopicSpec kMapTiles{"pocd/map/tiles",
                                      "pocd_msgs::msg::dds_::MapTile_",
                                      Direction::kOut,
                                      true,
-                                     {true, true, 1, 0, 0, true, 0, 0}};
-inline constexpr TopicSpec kMapDeltas{"pocd/map/deltas",
-                                      "pocd_msgs::msg::dds_::MapDelta_",
-                                      Direction::kOut,
-                                      false,
-                                      {true, false, 1000, 0, 0, true, 0, -5}};
+                                     {true, true, 1, 0, 0, true, 0}};
+inline constexpr TopicSpec kMapDeltas{"pocd/map/deltas", "pocd_msgs::msg::dds_::MapDelta_",
+                                      Direction::kOut, false, reliable(1000)};
 inline constexpr TopicSpec kMapManifest{"pocd/map/manifest", "pocd_msgs::msg::dds_::MapManifest_",
                                         Direction::kOut, true, latched(1)};
 inline constexpr TopicSpec kSnapshotRequest{"pocd/map/snapshot_request",
@@ -79,9 +75,7 @@ inline constexpr TopicSpec kSnapshotRequest{"pocd/map/snapshot_request",
 // A reply may have many parts, and all of them have to arrive.
 inline constexpr TopicSpec kSnapshotReply{"pocd/map/snapshot_reply",
                                           "pocd_msgs::msg::dds_::MapSnapshotReply_",
-                                          Direction::kBoth,
-                                          false,
-                                          {true, false, 1000, 0, 0, true, 0, 5}};
+                                          Direction::kBoth, false, reliable(1000)};
 inline constexpr TopicSpec kHealth{"pocd/health",
                                    "pocd_msgs::msg::dds_::NodeHealth_",
                                    Direction::kOut,

@@ -1,6 +1,8 @@
 #include "pocd_dds/node/map_publication.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <thread>
 
 namespace pocd::dds {
 namespace {
@@ -9,6 +11,20 @@ constexpr std::uint32_t kMapId = 0;
 // Small enough that losing one costs little, large enough that a frame's change is a few messages.
 constexpr std::size_t kPartBytes = 256 * 1024;
 constexpr std::chrono::seconds kLongestReply{5};
+constexpr std::chrono::milliseconds kTurn{5};
+
+template <class Message>
+std::size_t payload_bytes(const Message& message) {
+  std::size_t bytes = 0;
+  for (const auto& tile : message.changed()) bytes += tile.payload().size();
+  return bytes;
+}
+
+/// What one message takes of the network: each subscriber gets its own.
+std::size_t network_bytes(std::size_t payload, const RawWriter& writer) {
+  constexpr std::size_t kHeaders = 200;
+  return (payload + kHeaders) * static_cast<std::size_t>(std::max(writer.matched(), 0));
+}
 
 }  // namespace
 
@@ -20,50 +36,101 @@ MapPublication::MapPublication(const std::shared_ptr<Participant>& participant,
       deltas_(participant, topics::kMapDeltas),
       manifest_(participant, topics::kMapManifest),
       replies_(participant, topics::kSnapshotReply),
-      requests_(participant, topics::kSnapshotRequest, wakeup) {}
+      requests_(participant, topics::kSnapshotRequest, wakeup),
+      budget_(1e6 * config.node.map_rate_mb_s) {}
 
 void MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
+  send_waiting();
   const auto time = std::chrono::steady_clock::now();
-  if (!now &&
-      std::chrono::duration<double>(time - last_sent_).count() < config_.node.map_period_s) {
-    return;
-  }
+  // When the network does not keep up, steps become fewer and larger instead of a queue that grows.
+  const bool due =
+      std::chrono::duration<double>(time - last_sent_).count() >= config_.node.map_period_s &&
+      deltas_waiting_.empty() && tiles_waiting_.empty();
+  if (!now && !due) return;
   last_sent_ = time;
-  const std::optional<MapDelta> delta = publisher_.update(map);
+  std::optional<MapDelta> delta = publisher_.update(map);
   if (!delta) return;
   stamp_ns_ = stamp_ns;
   for (auto& message : delta_messages(*delta, kMapId, stamp_ns, kPartBytes)) {
-    deltas_.write(message);
+    deltas_waiting_.push_back(std::move(message));
   }
-  for (const MapTile& tile : delta->changed) {
-    auto message = tile_message(tile, kMapId, delta->epoch);
-    tiles_.write(message);
-    step_bytes_ += tile.payload.size();
+  for (const MapTile& tile : delta->changed) tiles_waiting_.push_back(tile.key);
+  for (const MapTile& tile : delta->changed) changed_.insert(tile.key);
+  changed_.insert(delta->removed.begin(), delta->removed.end());
+  tiles_waiting_.insert(tiles_waiting_.end(), delta->removed.begin(), delta->removed.end());
+  send_waiting();
+}
+
+void MapPublication::send_waiting() {
+  const auto time = std::chrono::steady_clock::now();
+  while (budget_.open(time) && (send_delta() || send_tile() || send_reply())) {
   }
-  for (const TileKey& key : delta->removed) {
-    auto message = tile_message(MapTile{key, 0, {}}, kMapId, delta->epoch);
-    tiles_.dispose(message);
+}
+
+bool MapPublication::send_delta() {
+  if (deltas_waiting_.empty()) return false;
+  auto& message = deltas_waiting_.front();
+  budget_.spend(network_bytes(payload_bytes(message), deltas_));
+  deltas_.write(message);  // one that is refused is a gap, which mirrors repair
+  deltas_waiting_.pop_front();
+  if (deltas_waiting_.empty()) {
+    announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size()};
   }
+  return true;
+}
+
+bool MapPublication::send_tile() {
+  if (tiles_waiting_.empty()) return false;
+  const TileKey key = tiles_waiting_.front();
+  const auto tile = publisher_.tiles().find(key);
+  const bool present = tile != publisher_.tiles().end();
+  auto message =
+      tile_message(present ? tile->second : MapTile{key, 0, {}}, kMapId, publisher_.epoch());
+  // One that is refused is tried again next time: nobody would miss it otherwise.
+  if (present) {
+    if (!tiles_.write(message)) return false;
+    on_bus_.insert(key);
+  } else if (on_bus_.count(key) > 0) {
+    if (!tiles_.dispose(message)) return false;
+    on_bus_.erase(key);
+  }
+  const std::size_t bytes = message.payload().size();
+  step_bytes_ += bytes;
+  budget_.spend(network_bytes(bytes, tiles_));
+  tiles_waiting_.pop_front();
+  return true;
+}
+
+bool MapPublication::send_reply() {
+  if (replies_waiting_.empty()) return false;
+  auto& message = replies_waiting_.front();
+  const std::size_t bytes = payload_bytes(message);
+  snapshot_bytes_ += bytes;
+  budget_.spend(network_bytes(bytes, replies_));
+  replies_.write(message);
+  replies_waiting_.pop_front();
+  answered_ = std::chrono::steady_clock::now();
+  return true;
 }
 
 void MapPublication::send_manifest(std::size_t objects, bool final_version) {
   pocd_msgs::msg::MapManifest manifest;
   manifest.map_id(kMapId);
   manifest.epoch(publisher_.epoch());
-  manifest.version(publisher_.version());
+  manifest.version(announced_.version);
   manifest.stamp(to_time(stamp_ns_));
   manifest.frame_id(config_.node.map_frame);
   manifest.voxel_size(config_.pipeline.map.voxel_size_m);
   manifest.truncation(config_.pipeline.map.truncation_m());
   manifest.tile_side(kTileSide);
-  manifest.tile_count(static_cast<std::uint32_t>(publisher_.tiles().size()));
+  manifest.tile_count(static_cast<std::uint32_t>(announced_.tiles));
   manifest.object_count(static_cast<std::uint32_t>(objects));
-  manifest.digest(digest_message(publisher_.digest()));
+  manifest.digest(digest_message(announced_.digest));
   manifest.final_version(final_version);
   manifest_.write(manifest);
 }
 
-void MapPublication::answer_requests(bool now) {
+void MapPublication::answer_requests() {
   pocd_msgs::msg::MapSnapshotRequest request;
   SampleMeta meta;
   while (requests_.take(request, meta)) {
@@ -72,29 +139,37 @@ void MapPublication::answer_requests(bool now) {
     const std::uint64_t held = same_run ? std::min(request.version(), publisher_.version()) : 0;
     wanted_ = wanted_ ? std::min(*wanted_, held) : held;
   }
-  if (!wanted_) return;
+  if (!wanted_ || !replies_waiting_.empty()) return;
   // A reply goes to all who listen. As long as one is under way, more who ask wait for the next one
   // together; but not for ever for one who has died.
-  const auto time = std::chrono::steady_clock::now();
-  if (!now && !replies_.wait_acknowledged(std::chrono::milliseconds(0)) &&
-      time - answered_ < kLongestReply) {
+  if (!replies_.wait_acknowledged(std::chrono::milliseconds(0)) &&
+      std::chrono::steady_clock::now() - answered_ < kLongestReply) {
     return;
   }
-  answered_ = time;
   ++snapshots_;
-  for (auto& message : snapshot_messages(publisher_, *wanted_, kMapId, kPartBytes)) {
-    for (const auto& tile : message.changed()) snapshot_bytes_ += tile.payload().size();
-    replies_.write(message);
-  }
+  auto messages = snapshot_messages(publisher_, *wanted_, kMapId, kPartBytes);
+  std::move(messages.begin(), messages.end(), std::back_inserter(replies_waiting_));
   wanted_.reset();
 }
 
 MapTraffic MapPublication::traffic() const {
-  return {publisher_.tiles().size(), publisher_.bytes(), publisher_.area_m2(), step_bytes_,
-          snapshot_bytes_,           snapshots_};
+  return {publisher_.tiles().size(),
+          publisher_.bytes(),
+          publisher_.area_m2(),
+          step_bytes_,
+          snapshot_bytes_,
+          snapshots_,
+          waiting()};
 }
 
 bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  for (;; std::this_thread::sleep_for(kTurn)) {
+    answer_requests();
+    send_waiting();
+    if (waiting() == 0 && !wanted_) break;
+    if (std::chrono::steady_clock::now() >= end) return false;
+  }
   return deltas_.wait_acknowledged(time) && tiles_.wait_acknowledged(time) &&
          manifest_.wait_acknowledged(time) && replies_.wait_acknowledged(time);
 }

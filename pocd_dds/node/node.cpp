@@ -19,22 +19,17 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kPoll{50};
+constexpr std::chrono::milliseconds kMapTurn{5};  // while map data waits for its rate
 constexpr double kStatusPeriodS = 1.0;
 
 double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
-
-BusOptions bus_options(const NodeOptions& options) {
-  BusOptions bus = options.bus;
-  bus.map_bytes_per_s = static_cast<std::uint32_t>(1e6 * options.config.node.map_rate_mb_s);
-  return bus;
-}
 
 }  // namespace
 
 struct Node::Impl {
   explicit Impl(const NodeOptions& options)
       : config(options.config),
-        participant(std::make_shared<Participant>(bus_options(options))),
+        participant(std::make_shared<Participant>(options.bus)),
         pipeline(config.pipeline),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
@@ -56,6 +51,7 @@ struct Node::Impl {
   void publish(bool now);
   void send_status(const std::string& state);
   void send_outputs(bool last);
+  void turn();
   bool finish();
 
   const NodeFile config;
@@ -67,6 +63,8 @@ struct Node::Impl {
   // run()'s thread only.
   RosOutputs outputs;
   NodeClock clock;
+  Clock::time_point status_sent{};
+  bool map_waits = false;
 
   // Guards everything below that the worker and run() both use.
   mutable std::mutex mutex;
@@ -151,22 +149,41 @@ void Node::Impl::send_outputs(bool last) {
   const StampNs now_ns = clock.now_ns();
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    outputs.collect(objects.objects(), map.publisher().tiles(), counts.stamp_ns, now_ns, last);
+    outputs.collect(objects.objects(), map.publisher().tiles(), map.changed(), counts.stamp_ns,
+                    now_ns, last);
   }
   outputs.send();
+}
+
+void Node::Impl::turn() {
+  wakeup.wait_for(map_waits ? kMapTurn : kPoll);
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    map.answer_requests();
+    map.send_waiting();
+    map_waits = map.waiting() > 0;
+  }
+  const auto now = Clock::now();
+  if (seconds(now - status_sent) >= kStatusPeriodS) {
+    status_sent = now;
+    send_status("running");
+  }
+  send_outputs(false);
 }
 
 bool Node::Impl::finish() {
   intake.stop();
   worker.join();
   if (failure) std::rethrow_exception(failure);
+  const auto wait =
+      std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
+  // The manifest that says that this was all follows the last delta.
+  const auto end = Clock::now() + wait;
+  while (map.waiting() > 0 && Clock::now() < end) turn();
   send_status("stopped");
   send_outputs(true);
   const std::lock_guard<std::mutex> lock(mutex);
-  const auto wait =
-      std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
   // A late subscriber that asked for a snapshot just now still gets it.
-  map.answer_requests(true);
   const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait) &&
                             frames.wait_acknowledged(wait) && status.wait_acknowledged(wait) &&
                             outputs.wait_acknowledged(wait);
@@ -183,20 +200,7 @@ Node::~Node() = default;
 
 bool Node::run(const std::atomic<bool>& stop) {
   Impl& node = *impl_;
-  Clock::time_point status_sent{};
-  while (!stop && !node.failed) {
-    node.wakeup.wait_for(kPoll);
-    {
-      const std::lock_guard<std::mutex> lock(node.mutex);
-      node.map.answer_requests(false);
-    }
-    const auto now = Clock::now();
-    if (seconds(now - status_sent) >= kStatusPeriodS) {
-      status_sent = now;
-      node.send_status("running");
-    }
-    node.send_outputs(false);
-  }
+  while (!stop && !node.failed) node.turn();
   return node.finish();
 }
 

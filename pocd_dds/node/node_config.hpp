@@ -6,7 +6,7 @@
 
 #include "pocd/config/describe.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
-#include "pocd_dds/entities/participant.hpp"
+#include "pocd_dds/entities/topic_table.hpp"
 
 namespace pocd::dds {
 
@@ -122,7 +122,7 @@ struct NodeConfig {
   bool lossless = false;
   double object_period_s = 0.1;
   double map_period_s = 0.5;
-  double map_rate_mb_s = 1e-6 * kMapBytesPerS;
+  double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
   bool use_clock = false;
   RosOutputConfig outputs;
   double shutdown_wait_s = 10.0;
@@ -153,7 +153,8 @@ struct NodeConfig {
           "Least time between two samples of one object [s].");
     visit("map_period_s", map_period_s, Range{0.0, 60.0}, "Least time between two map deltas [s].");
     visit("map_rate_mb_s", map_rate_mb_s, Range{0.01, 1000.0},
-          "Most that map data takes of the network, all subscribers together [MB/s].");
+          "Most that map data takes of the network, all subscribers together, without what late "
+          "joiners of the tiles get [MB/s].");
     visit("use_clock", use_clock,
           "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
           "use_sim_time).");

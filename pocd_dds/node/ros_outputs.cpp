@@ -55,29 +55,25 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
   make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
 }
 
-void RosOutputs::copy_tiles(const std::map<TileKey, MapTile>& tiles) {
-  const auto note = [&](const TileKey& key, bool changed) {
-    if (grid_) grid_steps_[key] = changed;
-    if (surface_) surface_steps_[key] = changed;
+void RosOutputs::copy_tiles(const std::map<TileKey, MapTile>& tiles, std::set<TileKey>& changed) {
+  const auto note = [&](const TileKey& key, bool present) {
+    if (grid_) grid_steps_[key] = present;
+    if (surface_) surface_steps_[key] = present;
   };
-  for (auto copy = tiles_.begin(); copy != tiles_.end();) {
-    if (tiles.count(copy->first) > 0) {
-      ++copy;
-    } else {
-      note(copy->first, false);
-      copy = tiles_.erase(copy);
+  for (const TileKey& key : changed) {
+    const auto tile = tiles.find(key);
+    if (tile != tiles.end()) {
+      tiles_[key] = tile->second;
+      note(key, true);
+    } else if (tiles_.erase(key) > 0) {
+      note(key, false);
     }
   }
-  for (const auto& [key, tile] : tiles) {
-    const auto copy = tiles_.find(key);
-    if (copy != tiles_.end() && copy->second.version == tile.version) continue;
-    tiles_[key] = tile;
-    note(key, true);
-  }
+  changed.clear();
 }
 
 void RosOutputs::collect(const ObjectsById& objects, const std::map<TileKey, MapTile>& tiles,
-                         StampNs stamp_ns, StampNs now_ns, bool last) {
+                         std::set<TileKey>& changed, StampNs stamp_ns, StampNs now_ns, bool last) {
   // A topic without any reader is not worked for; who comes later gets it at the next period.
   markers_due_ = markers_ && (markers_pace_.due(now_ns) || last);
   occupancy_due_ = grid_ && (occupancy_pace_.due(now_ns) || last);
@@ -87,7 +83,7 @@ void RosOutputs::collect(const ObjectsById& objects, const std::map<TileKey, Map
   now_ns_ = now_ns;
   last_ = last;
   if (markers_due_ || obstacles_due_ || surface_due_) objects_ = objects;
-  if (occupancy_due_ || surface_due_) copy_tiles(tiles);
+  if (occupancy_due_ || surface_due_) copy_tiles(tiles, changed);
 }
 
 void RosOutputs::send() {

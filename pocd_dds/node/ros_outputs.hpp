@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "map_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
@@ -26,9 +27,10 @@ class RosOutputs {
              std::uint64_t epoch);
 
   /// Copies what the outputs that are due need; with `last`, the final state for those that keep
-  /// one.
+  /// one. `changed`, and removed, of the tiles since it was last emptied: done here when they are
+  /// copied.
   void collect(const ObjectsById& objects, const std::map<TileKey, MapTile>& tiles,
-               StampNs stamp_ns, StampNs now_ns, bool last);
+               std::set<TileKey>& changed, StampNs stamp_ns, StampNs now_ns, bool last);
   void send();
   /// Of the topics that keep their last state.
   bool wait_acknowledged(std::chrono::milliseconds time);
@@ -38,7 +40,7 @@ class RosOutputs {
   void send_obstacles();
   void send_occupancy();
   void send_surface();
-  void copy_tiles(const std::map<TileKey, MapTile>& tiles);
+  void copy_tiles(const std::map<TileKey, MapTile>& tiles, std::set<TileKey>& changed);
 
   const NodeFile config_;
   const RosOutputConfig& rates_;

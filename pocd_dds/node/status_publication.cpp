@@ -142,6 +142,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   add(node, "map bytes per second", fixed(static_cast<double>(map_bytes - map_bytes_) / elapsed_s));
   add(node, "map bytes published", std::to_string(map_bytes));
   add(node, "map bytes in snapshots", std::to_string(work.map.snapshot_bytes));
+  add(node, "map messages waiting", std::to_string(work.map.waiting));
   map_bytes_ = map_bytes;
   sent_ = now;
   if (!work.last_warning.empty()) add(node, "last warning", work.last_warning);

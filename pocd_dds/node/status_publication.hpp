@@ -21,6 +21,7 @@ struct MapTraffic {
   double area_m2 = 0.0;                              ///< of floor that tiles stand on
   std::uint64_t step_bytes = 0, snapshot_bytes = 0;  ///< payload sent since the start
   std::uint64_t snapshots = 0;
+  std::size_t waiting = 0;  ///< messages that the rate holds back
 };
 
 /// What the worker knows.

@@ -49,7 +49,7 @@ double resident_mb() {
 
 struct Options {
   std::string scenario = "config/sim/demo.yaml", config = "config/simulated.yaml", mirror;
-  double area_m2 = 10000.0, rate_mb_s = 1e-6 * dds::kMapBytesPerS, seconds = 20.0;
+  double area_m2 = 10000.0, rate_mb_s = 10.0, seconds = 20.0;
   int robots = 100, domain = 90;
   std::size_t max_frames = 100000;
 };
@@ -141,10 +141,11 @@ class LargeMap {
     const double before_mb = resident_mb();
     tile_floor(scenario, options, scenario_m2, map_);
     std::printf("voxels: %zu blocks, %.0f MB\n", map_.block_count(), resident_mb() - before_mb);
-    dds::BusOptions bus{options.domain, "", "pocd_bus_costs"};
-    bus.map_bytes_per_s = static_cast<std::uint32_t>(1e6 * options.rate_mb_s);
-    participant_ = std::make_shared<dds::Participant>(bus);
-    publication_.emplace(participant_, file, 1, wakeup_);
+    participant_ =
+        std::make_shared<dds::Participant>(dds::BusOptions{options.domain, "", "pocd_bus_costs"});
+    dds::NodeFile with_rate = file;
+    with_rate.node.map_rate_mb_s = options.rate_mb_s;
+    publication_.emplace(participant_, with_rate, 1, wakeup_);
     const double map_mb = resident_mb(), cpu = own_cpu_s();
     publication_->send_due(map_, 1, true);
     const dds::MapTraffic size = publication_->traffic();
@@ -160,8 +161,9 @@ class LargeMap {
     const auto keys = map_.sorted_keys();
     auto stepped = Clock::now(), told = Clock::time_point{};
     while (!done()) {
-      wakeup_.wait_for(std::chrono::milliseconds(20));
-      publication_->answer_requests(false);
+      wakeup_.wait_for(std::chrono::milliseconds(5));
+      publication_->answer_requests();
+      publication_->send_waiting();
       if (seconds_since(told) >= 1.0) publication_->send_manifest(0, false), told = Clock::now();
       if (tiles <= 0 || seconds_since(stepped) < period_s) continue;
       stepped = Clock::now();
@@ -174,7 +176,7 @@ class LargeMap {
           }
         }
       }
-      publication_->send_due(map_, 1, true);
+      publication_->send_due(map_, 1, false);
     }
   }
   dds::MapPublication& publication() { return *publication_; }

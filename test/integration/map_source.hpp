@@ -39,15 +39,16 @@ inline void fill_block(TsdfMap& map, const BlockKey& key, Random& random) {
 /// Not thread-safe, except history_at().
 class MapSource {
  public:
-  MapSource(const TestDomain& domain, std::uint64_t epoch, std::uint32_t bytes_per_s,
+  MapSource(const TestDomain& domain, std::uint64_t epoch, double rate_mb_s,
             const std::string& profiles_file = "")
       : map(TsdfConfig{}),
         random(epoch),
-        participant(make(domain, bytes_per_s, profiles_file)),
-        publication(participant, dds::NodeFile{}, epoch, wakeup) {}
+        participant(make(domain, profiles_file)),
+        publication(participant, config(rate_mb_s), epoch, wakeup) {}
 
-  /// Changes some blocks of a map of at most `size`^2 columns of tiles, removes some, publishes.
-  void step(int size) {
+  /// Changes some blocks of a map of at most `size`^2 columns of tiles, removes some, publishes, at
+  /// the latest when the step before has left or `now`.
+  void step(int size, bool now) {
     const auto cell = [&] { return static_cast<std::int32_t>(random.below(2 * size)); };
     for (int i = 0; i < 4; ++i) fill_block(map, {cell(), cell(), 0}, random);
     if (random.uniform() < 0.3) map.clear_object(ObjectId{1});
@@ -56,12 +57,16 @@ class MapSource {
       const BlockKey key{cell(), cell(), 0};
       if (map.find(key)) map.touch(key).weight.fill(0);
     }
-    publish();
+    publish(now);
   }
-  void publish() {
+  void publish(bool now = true) {
     const std::lock_guard<std::mutex> lock(mutex_);  // before anybody can have the new version
-    publication.send_due(map, 1, true);
+    publication.send_due(map, 1, now);
     history_[publication.publisher().version()] = publication.publisher().digest();
+  }
+  void turn() {
+    publication.answer_requests();
+    publication.send_waiting();
   }
   MapDigest history_at(std::uint64_t version) const {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -75,12 +80,17 @@ class MapSource {
   dds::MapPublication publication;
 
  private:
-  static std::shared_ptr<dds::Participant> make(const TestDomain& domain, std::uint32_t rate,
+  static std::shared_ptr<dds::Participant> make(const TestDomain& domain,
                                                 const std::string& profiles_file) {
     talk_over_the_bus();
-    dds::BusOptions options{domain.number(), profiles_file, "pocd_test"};
-    options.map_bytes_per_s = rate;
-    return std::make_shared<dds::Participant>(options);
+    return std::make_shared<dds::Participant>(
+        dds::BusOptions{domain.number(), profiles_file, "pocd_test"});
+  }
+  static dds::NodeFile config(double rate_mb_s) {
+    dds::NodeFile file;
+    file.node.map_period_s = 0.0;
+    file.node.map_rate_mb_s = rate_mb_s;
+    return file;
   }
   mutable std::mutex mutex_;
   std::map<std::uint64_t, MapDigest> history_{{0, MapDigest{}}};

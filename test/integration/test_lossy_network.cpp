@@ -23,7 +23,7 @@ TEST_P(LossyNetwork, ObjectsAndMapConverge) {
   const std::string profile =
       GetParam().profile ? source("launch_scripts/lossy_network.xml") : std::string();
   const TestDomain domain;
-  MapSource map(domain, 7, dds::kMapBytesPerS, profile);
+  MapSource map(domain, 7, 10.0, profile);
   dds::Writer<pocd_msgs::msg::ObjectStatePubSubType> objects(map.participant,
                                                              dds::topics::kObjects);
   std::vector<std::string> command{bin("pocd_mirror"), "--until-end", "--timeout", "110",
@@ -43,8 +43,8 @@ TEST_P(LossyNetwork, ObjectsAndMapConverge) {
   for (int i = 1; i <= 100; ++i) {
     auto state = object(i);
     ASSERT_TRUE(objects.write(state));
-    map.publication.answer_requests(false);
-    if (i <= 60) map.step(6);
+    map.turn();
+    if (i <= 60) map.step(6, true);
     if (i % 10 == 0) map.publication.send_manifest(70, false);
   }
   for (int i = 1; i <= 30; ++i) {
@@ -52,6 +52,10 @@ TEST_P(LossyNetwork, ObjectsAndMapConverge) {
     ASSERT_TRUE(objects.dispose(state));
   }
   ASSERT_TRUE(objects.wait_acknowledged(kGenerous));
+  while (map.publication.waiting() > 0) {
+    map.wakeup.wait_for(std::chrono::milliseconds(5));
+    map.turn();
+  }
   map.publication.send_manifest(70, true);
   const auto written = std::chrono::steady_clock::now();
   std::atomic<bool> ended{false};
@@ -59,7 +63,7 @@ TEST_P(LossyNetwork, ObjectsAndMapConverge) {
   std::thread waiter([&] { result = mirror.wait(), ended = true; });
   while (!ended) {
     map.wakeup.wait_for(std::chrono::milliseconds(20));
-    map.publication.answer_requests(false);
+    map.turn();
   }
   waiter.join();
   const auto seconds = [](auto from, auto to) {
