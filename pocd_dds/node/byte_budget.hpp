@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <optional>
 
 namespace pocd::dds {
 
@@ -17,10 +16,8 @@ class ByteBudget {
   explicit ByteBudget(double bytes_per_s) : rate_(bytes_per_s), left_(rate_ * kSavedS) {}
 
   bool open(Time now) {
-    if (last_) {
-      left_ += rate_ * std::chrono::duration<double>(now - *last_).count();
-      left_ = std::min(left_, rate_ * kSavedS);
-    }
+    left_ += rate_ * std::chrono::duration<double>(now - last_).count();
+    left_ = std::min(left_, rate_ * kSavedS);
     last_ = now;
     return left_ > 0.0;
   }
@@ -29,7 +26,7 @@ class ByteBudget {
  private:
   static constexpr double kSavedS = 0.05;
   double rate_, left_;
-  std::optional<Time> last_;
+  Time last_{};
 };
 
 }  // namespace pocd::dds
