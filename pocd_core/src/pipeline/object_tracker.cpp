@@ -161,7 +161,8 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
     object.frames_displaced = 0;
     // What lies beside the surface for a while may be the object, turned, of which too little is
     // seen yet to tell: fused, it would make the two places one model.
-    object.frames_odd = suspicious ? object.frames_odd + 1 : 0;
+    const int looks = moment_of(step, object).robots.size() == 1 ? 1 : 0;
+    object.frames_odd = suspicious ? object.frames_odd + looks : 0;
     return suspicious && object.frames_odd <= kOddFrames;
   }
   // Not fused: it would smear the model between the two places.
