@@ -170,8 +170,8 @@ DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& 
     return qos;
   }
   apply(delivery, qos);
-  // The default of 3 s is how long a lost last sample would stay lost. A writer that keeps all is one
-  // whose sender waits for acknowledgements, which readers only give when a heartbeat asks.
+  // The default of 3 s is how long a lost last sample would stay lost. A writer that keeps all is
+  // one whose sender waits for acknowledgements, which readers only give when a heartbeat asks.
   const double heartbeat_s = delivery.keep_last > 0 ? 0.1 : 0.005;
   qos.reliable_writer_qos().times.heartbeatPeriod = eprosima::fastrtps::Duration_t(heartbeat_s);
   qos.publish_mode().kind =

@@ -13,8 +13,8 @@ namespace {
 std::string stamp_text(StampNs stamp_ns) {
   const StampNs billion = 1'000'000'000;
   std::string nanoseconds = std::to_string(std::abs(stamp_ns % billion));
-  return std::to_string(stamp_ns / billion) + "." +
-         std::string(9 - nanoseconds.size(), '0') + nanoseconds;
+  return std::to_string(stamp_ns / billion) + "." + std::string(9 - nanoseconds.size(), '0') +
+         nanoseconds;
 }
 
 const char* name_of(TimeSynchronizer::Stream stream) {
@@ -73,7 +73,9 @@ bool TimeSynchronizer::add_camera_info(StampNs stamp_ns, const CameraModel& came
   return true;
 }
 
-void TimeSynchronizer::pose_seen(StampNs stamp_ns) { horizon_ns_ = std::max(horizon_ns_, stamp_ns); }
+void TimeSynchronizer::pose_seen(StampNs stamp_ns) {
+  horizon_ns_ = std::max(horizon_ns_, stamp_ns);
+}
 
 std::optional<cv::Mat> TimeSynchronizer::match(std::deque<std::pair<StampNs, cv::Mat>>& stream,
                                                StampNs stamp_ns) {
@@ -139,9 +141,8 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
       drop = &counts_.dropped_no_camera_info;
     }
     if (drop == nullptr) {
-      const TransformLookup pose =
-          transforms_.lookup(config_.map_frame, config_.camera_frame, stamp_ns,
-                             settle ? config_.extrapolation_ns : 0);
+      const TransformLookup pose = transforms_.lookup(
+          config_.map_frame, config_.camera_frame, stamp_ns, settle ? config_.extrapolation_ns : 0);
       if (pose.result == PoseLookup::kFound) {
         frame.T_W_C = pose.T_target_source;
       } else if (!settle &&

@@ -334,7 +334,8 @@ void ObjectTracker::add_new(Step& step) {
     const auto origin = step.moved_from.find(index);
     if (origin != step.moved_from.end()) object.moved_from = origin->second;
     fuse(step, object, index);
-    // The first look says what is there; another one in the same moment, nothing of whether it stays.
+    // The first look says what is there; another one in the same moment, nothing of whether it
+    // stays.
     object.moment.measured = true;
     object.moment.points = std::numeric_limits<int>::max();
     object.frames_in_view = 1;

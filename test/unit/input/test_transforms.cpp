@@ -89,7 +89,8 @@ TEST(TransformTree, ALoopIsNoChain) {
   EXPECT_EQ(tree.lookup("map", "a", 0, 0).result, PoseLookup::kLoop);
 }
 
-// The pose that a node computes from messages is the one that an offline run computes, in every bit.
+// The pose that a node computes from messages is the one that an offline run computes, in every
+// bit.
 TEST(TransformTree, EqualsThroughMessagesBitByBit) {
   Random random(3);
   for (int i = 0; i < 1000; ++i) {

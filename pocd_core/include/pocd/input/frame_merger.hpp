@@ -13,9 +13,9 @@
 
 namespace pocd {
 
-/// Order: by stamp, then by the robot's name. A frame comes out once every live robot's watermark has
-/// reached its stamp; a robot that lags behind the newest frame by more than `max_wait_ns` of data time
-/// is not waited for until it has caught up. Not thread-safe.
+/// Order: by stamp, then by the robot's name. A frame comes out once every live robot's watermark
+/// has reached its stamp; a robot that lags behind the newest frame by more than `max_wait_ns` of
+/// data time is not waited for until it has caught up. Not thread-safe.
 template <class Item>
 class FrameMerger {
  public:

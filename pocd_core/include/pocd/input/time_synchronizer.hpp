@@ -18,8 +18,8 @@
 
 namespace pocd {
 
-/// kAbsent: not looked at. kOptional: waited for, then gone on without. kRequired: waited for, then the
-/// frame is dropped.
+/// kAbsent: not looked at. kOptional: waited for, then gone on without. kRequired: waited for, then
+/// the frame is dropped.
 enum class StreamUse { kAbsent, kOptional, kRequired };
 
 struct SynchronizerConfig {
@@ -61,8 +61,8 @@ struct SynchronizerCounts {
 };
 
 /// Streams of one robot. Time is data time only: nothing here reads a clock. Frames come out in the
-/// order of their stamps; the oldest one holds up the others until it is complete or its wait is over.
-/// Not thread-safe.
+/// order of their stamps; the oldest one holds up the others until it is complete or its wait is
+/// over. Not thread-safe.
 class TimeSynchronizer {
  public:
   /// `transforms` must outlive the synchroniser; it gives T_map_camera.
