@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Maps what the robots' cameras see and publishes what changes.\n"
       "Example: pocd_node --config config/simulated.yaml --robot robot_1 --robot robot_2\n"
+      "Without a named robot, it listens to every robot that appears on the bus.\n"
       "Runs until SIGINT or SIGTERM, then publishes its last state.\n"
       "Exit code: 0 ended in order, 1 the bus failed or subscribers did not acknowledge the last "
       "state, 2 usage or configuration.",
@@ -93,8 +94,13 @@ int main(int argc, char** argv) {
       std::cout << pocd::dump_config(options.config);
       return std::cout.flush() ? 0 : 1;
     }
-    if (options.config.node.robots.empty()) {
-      throw pocd::InputError("no robot: give --robot NAME or node.robots in the configuration");
+    if (options.config.node.discovers()) {
+      for (const std::string& pattern : options.config.node.topics.of_each_robot()) {
+        if (pattern.find("{robot}") != std::string::npos) continue;
+        throw pocd::InputError("no robot: node.topics has \"" + pattern +
+                               "\", without {robot} to tell robots apart; give --robot NAME or "
+                               "node.robots");
+      }
     }
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
   } catch (const pocd::InputError& error) {
@@ -106,8 +112,9 @@ int main(int argc, char** argv) {
     pocd::dds::stop_on_signals();
     options.epoch = epoch ? *epoch : random_epoch();
     pocd::dds::Node node(options);
-    spdlog::info("running on domain {}, epoch {:016x}, {} robot(s)", options.bus.domain,
-                 options.epoch, options.config.node.robots.size());
+    spdlog::info("running on domain {}, epoch {:016x}, {} robot(s) named{}", options.bus.domain,
+                 options.epoch, options.config.node.robots.size(),
+                 options.config.node.discovers() ? ", others as they appear" : "");
     const bool good = node.run(pocd::dds::stop_requested);
     const pocd::dds::WorkStatus work = node.work_status();
     spdlog::info("ended: {} frames processed, {} refused, {} objects, map version {}",

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -14,8 +13,9 @@
 #include "pocd/input/camera_model.hpp"
 #include "pocd/input/pose_quaternion.hpp"
 #include "pocd/map/map_follower.hpp"
+#include "pocd/input/message_checks.hpp"
+#include "pocd/map/map_delta.hpp"
 #include "pocd/pipeline/frame_result.hpp"
-#include "pocd/segmentation/class_map.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_msgs.h"
 #include "sensor_msgs.h"
@@ -26,41 +26,15 @@ namespace pocd::dds {
 StampNs to_stamp(const builtin_interfaces::msg::Time& time);
 builtin_interfaces::msg::Time to_time(StampNs stamp_ns);
 
-// ---- input ----
+// ---- input: pocd/input/message_checks.hpp says what is accepted ----
 
-/// 16UC1 and mono16 (millimetres) as CV_16UC1, 32FC1 (metres) as CV_32FC1; a copy.
 Checked<cv::Mat> depth_from(const sensor_msgs::msg::Image& image);
-/// rgb8 and bgr8 as CV_8UC3 BGR; a copy.
 Checked<cv::Mat> color_from(const sensor_msgs::msg::Image& image);
 
-/// Colours of a class map, for masks that are coloured.
-class ColourTable {
- public:
-  /// Throws InputError naming the class whose rgb is not "r,g,b" with values in 0 to 255, or is
-  /// taken.
-  explicit ColourTable(const ClassMap& classes);
-  /// Pixel value of the label image; -1 for a colour of no class.
-  int value(std::uint8_t r, std::uint8_t g, std::uint8_t b) const;
-
- private:
-  std::map<std::uint32_t, int> values_;
-};
-
-struct LabelImage {
-  cv::Mat labels;                    ///< CV_16UC1
-  std::uint64_t unknown_pixels = 0;  ///< colours of no class: they became class 0
-};
-/// mono8, mono16 (also 8UC1, 16UC1): class indices. rgb8, bgr8: by colour. A copy.
 Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& image, const ColourTable& colours);
 
 Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info);
 
-/// A transform parent -> child at a stamp, from odometry or tf.
-struct StampedTransform {
-  std::string parent, child;
-  StampNs stamp_ns = 0;
-  PoseQuaternion T;
-};
 Checked<StampedTransform> transform_from(const nav_msgs::msg::Odometry& odometry);
 Checked<StampedTransform> transform_from(const geometry_msgs::msg::TransformStamped& transform);
 

@@ -187,6 +187,7 @@ pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, std::ui
   message.last_seen(to_time(object.last_seen_ns));
   message.observations(object.observations);
   message.last_robot(object.last_robot);
+  message.seen_by(object.seen_by);
   return message;
 }
 
@@ -201,6 +202,7 @@ ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message) {
   object.last_seen_ns = to_stamp(message.last_seen());
   object.observations = message.observations();
   object.last_robot = message.last_robot();
+  object.seen_by = message.seen_by();
   return object;
 }
 

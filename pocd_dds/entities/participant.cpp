@@ -30,6 +30,8 @@ namespace {
 constexpr std::uint32_t kSegmentBytes = 32u << 20;
 // Images in 64 KB fragments over UDP need room for a whole one.
 constexpr std::uint32_t kSocketBytes = 4u << 20;
+// Within a lease; one that is lost on the way does no harm.
+constexpr double kSignsOfLife = 5.0;
 constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbers overflow
 
 // The name has to outlive every participant.
@@ -130,6 +132,13 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   if (qos.transport().user_transports.empty() && qos.transport().use_builtin_transports) {
     set_transports(qos);
     warn_of_small_buffers();
+  }
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  if (discovery.leaseDuration ==
+      DomainParticipantQos().wire_protocol().builtin.discovery_config.leaseDuration) {
+    discovery.leaseDuration = eprosima::fastrtps::Duration_t(options.lease_s);
+    discovery.leaseDuration_announcementperiod =
+        eprosima::fastrtps::Duration_t(options.lease_s / kSignsOfLife);
   }
   if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();

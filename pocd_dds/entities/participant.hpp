@@ -17,6 +17,8 @@ struct BusOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd";
+  /// Others forget this participant when they have not heard of it for so long [s].
+  double lease_s = 5.0;
   /// Hears of everything that is discovered, from the first moment; must outlive the participant.
   eprosima::fastdds::dds::DomainParticipantListener* listener = nullptr;
 };

@@ -1,7 +1,7 @@
 // Every topic of the component: name, type, quality of service, direction. Nothing else names one.
 #pragma once
 
-#include <string>
+#include "pocd/input/robot_topic.hpp"
 
 namespace pocd::dds {
 
@@ -18,7 +18,7 @@ struct Delivery {
 
 enum class Direction { kIn, kOut, kBoth };
 
-/// `name` may hold {robot}, which robot_topic() replaces.
+/// `name` may hold {robot}, which pocd::robot_topic() replaces.
 struct TopicSpec {
   const char* name;
   const char* type;
@@ -99,8 +99,5 @@ inline constexpr TopicSpec kRmfObstacles{"rt/rmf_obstacles",
                                          Direction::kOut, false, best_effort(10)};
 
 }  // namespace topics
-
-/// `pattern` with every {robot} replaced.
-std::string robot_topic(const std::string& pattern, const std::string& robot);
 
 }  // namespace pocd::dds

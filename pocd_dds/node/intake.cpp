@@ -4,33 +4,48 @@
 
 #include <algorithm>
 
+#include "pocd/common/check.hpp"
+
 namespace pocd::dds {
 namespace {
 
 // Frames of one robot that wait for another robot's. A robot that falls this far behind is not slow
 // on the bus: it has no frames in this stretch of the replay.
 constexpr std::size_t kMostBehind = 64;
+constexpr std::size_t kMostDepartures = 16;
 constexpr std::chrono::milliseconds kIdle{100};
+
+StampNs wall_clock_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
 
 }  // namespace
 
 Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-               const ClassMap& classes, FrameQueue& queue)
-    : lossless_(node.lossless),
+               const ClassMap& classes, BusWatch& watch, FrameQueue& queue)
+    : participant_(participant),
+      node_(node),
+      watch_(watch),
       queue_(queue),
       colours_(classes),
-      tf_(participant, topics::kTf, wakeup_),
-      tf_static_(participant, topics::kTfStatic, wakeup_),
+      roster_(node, problems_),
+      transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
+      tf_(node.topics.own_tf() ? nullptr
+                               : std::make_unique<TransformInput>(participant, node.topics.tf,
+                                                                  node.topics.tf_static, wakeup_)),
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
-  for (const RobotConfig& robot : node.robots) {
-    robots_.push_back(
-        std::make_unique<RobotInput>(participant, node, robot, colours_, problems_, wakeup_));
-  }
+  for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
   update_status();
+  watch_.set_wake([this] { wakeup_.wake(); });
   thread_ = std::thread([this] { run(); });
 }
 
-Intake::~Intake() { stop(); }
+Intake::~Intake() {
+  stop();
+  watch_.set_wake(nullptr);
+}
 
 void Intake::stop() {
   stopping_ = true;
@@ -47,33 +62,86 @@ void Intake::run() {
   queue_.close();
 }
 
-void Intake::step(bool last) {
-  drain_transforms(tf_static_, true);
-  drain_transforms(tf_, false);
-  for (const auto& robot : robots_) {
-    const bool hold = lossless_ && !last && merger_.pending(robot->name()) >= kMostBehind;
-    robot->drain(hold);
-    for (Frame& frame : robot->take(last)) {
-      const StampNs stamp_ns = frame.stamp_ns;
-      merger_.add(robot->name(), stamp_ns, std::move(frame));
+void Intake::meet(const std::string& name, const RobotConfig& config, bool named) {
+  Robot& robot = robots_[name];
+  robot.named = named;
+  robot.input = std::make_unique<RobotInput>(participant_, node_, config, colours_, transforms_,
+                                             problems_, wakeup_);
+}
+
+void Intake::follow_roster() {
+  const auto now = Roster::Clock::now();
+  for (const BusEvent& event : watch_.take()) follow(roster_.hear(event, now));
+  follow(roster_.settle(now));
+}
+
+void Intake::follow(const std::vector<RosterChange>& changes) {
+  for (const RosterChange& change : changes) {
+    const auto known = robots_.find(change.robot);
+    if (!change.present) {
+      spdlog::warn("{}: has gone: {}", change.robot, change.reason);
+      departures_.push_back({change.robot, change.reason, wall_clock_ns()});
+      if (departures_.size() > kMostDepartures) departures_.pop_front();
+      if (known != robots_.end()) known->second.announced = false;
+      continue;
     }
-    if (robot->settle_departure())
-      spdlog::info("{}: the source of its images has gone", robot->name());
-    merger_.set_live(robot->name(), robot->live());
-    merger_.set_watermark(robot->name(), robot->watermark_ns());
+    if (known == robots_.end()) {
+      RobotConfig config;
+      config.name = change.robot;
+      try {
+        meet(change.robot, config, false);
+      } catch (const InputError& error) {
+        robots_.erase(change.robot);
+        problems_.count(robot_topic(node_.topics.depth, change.robot),
+                        {InputReason::kWrongType, error.what()});
+        continue;
+      }
+    }
+    robots_[change.robot].announced = true;
+    spdlog::info("{}: is on the bus", change.robot);
+  }
+}
+
+void Intake::step(bool last) {
+  follow_roster();
+  if (tf_) tf_->drain(transforms_, problems_);
+  for (auto it = robots_.begin(); it != robots_.end();) {
+    const auto& [name, robot] = *it;
+    RobotInput& input = *robot.input;
+    const bool hold = node_.lossless && !last && merger_.pending(name) >= kMostBehind;
+    input.drain(hold);
+    for (Frame& frame : input.take(last)) {
+      const StampNs stamp_ns = frame.stamp_ns;
+      merger_.add(name, stamp_ns, std::move(frame));
+    }
+    // A replay may be paused; who is silent on a live bus is not waited for.
+    const bool silent = !node_.lossless && input.silent_s() >= node_.silent_wait_s;
+    merger_.set_live(name, input.live() && !silent);
+    merger_.set_watermark(name, input.watermark_ns());
+    it = see_off(it->second) ? robots_.erase(it) : std::next(it);
   }
   hand_over(last);
   update_status();
 }
 
+bool Intake::see_off(const Robot& robot) {
+  RobotInput& input = *robot.input;
+  const auto frames = input.settle_departure();
+  if (frames) transforms_.forget_moving(*frames);
+  // The roster and the readers hear of a departure in either order.
+  if (robot.named || robot.announced || input.live() || !input.settled()) return false;
+  merger_.forget(input.name());
+  return true;
+}
+
 void Intake::hand_over(bool last) {
-  while (last || !lossless_ || queue_.has_room()) {
+  while (last || !node_.lossless || queue_.has_room()) {
     const bool far_behind = std::any_of(robots_.begin(), robots_.end(), [&](const auto& robot) {
-      return merger_.pending(robot->name()) >= kMostBehind;
+      return merger_.pending(robot.first) >= kMostBehind;
     });
     std::optional<Frame> frame = merger_.take(last || far_behind);
     if (!frame) return;
-    if (lossless_ || last) {
+    if (node_.lossless || last) {
       queue_.push(std::move(*frame));
     } else {
       queue_.push_dropping(std::move(*frame));
@@ -81,40 +149,22 @@ void Intake::hand_over(bool last) {
   }
 }
 
-void Intake::drain_transforms(TfReader& reader, bool is_static) {
-  tf2_msgs::msg::TFMessage message;
-  SampleMeta meta;
-  while (reader.take(message, meta)) {
-    if (!meta.valid) continue;
-    for (const auto& transform : message.transforms()) {
-      const Checked<StampedTransform> checked = transform_from(transform);
-      if (checked.problem) {
-        problems_.count(reader.topic(), *checked.problem);
-        continue;
-      }
-      bool in_order = true;
-      for (const auto& robot : robots_) {
-        in_order = robot->add_transform(*checked.value, is_static) && in_order;
-      }
-      if (!in_order) {
-        problems_.count(reader.topic(), {InputReason::kStampBackwards,
-                                         checked.value->parent + " -> " + checked.value->child +
-                                             ": stamp is before the last one"});
-      }
-    }
-  }
-}
-
 void Intake::update_status() {
   IntakeStatus status;
-  for (const auto& robot : robots_) {
-    std::string waiting = robot->waiting_for();
-    if (waiting.empty() && merger_.waits_for() == robot->name()) {
+  for (const auto& [name, robot] : robots_) {
+    const RobotInput& input = *robot.input;
+    std::string waiting = input.waiting_for();
+    const double silent_s = input.silent_s();
+    if (silent_s >= node_.silent_wait_s) {
+      waiting = "has sent no depth image for " + std::to_string(static_cast<long>(silent_s)) +
+                " s: the other robots do not wait for it";
+    } else if (waiting.empty() && merger_.waits_for() == name) {
       waiting = "the other robots wait for its next frame";
     }
-    status.robots.push_back({robot->name(), robot->live(), robot->frames(), robot->dropped(),
-                             robot->lost(), std::move(waiting)});
+    status.robots.push_back({name, input.live(), input.frames(), input.dropped(), input.lost(),
+                             std::move(waiting), input.images()});
   }
+  status.departures.assign(departures_.begin(), departures_.end());
   status.problems = problems_.entries();
   const std::lock_guard<std::mutex> lock(status_mutex_);
   status_ = std::move(status);

@@ -1,7 +1,10 @@
-// Everything that comes in: readers of all robots, merged into one order, handed to the queue.
+// Everything that comes in: robots as they come and go, their readers, merged into one order,
+// handed to the queue.
 #pragma once
 
 #include <atomic>
+#include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -9,9 +12,10 @@
 #include <vector>
 
 #include "pocd/input/frame_merger.hpp"
+#include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/frame_queue.hpp"
 #include "pocd_dds/node/robot_input.hpp"
-#include "tf2_msgsPubSubTypes.h"
+#include "pocd_dds/node/roster.hpp"
 
 namespace pocd::dds {
 
@@ -19,20 +23,30 @@ struct RobotStatus {
   std::string name;
   bool live = false;
   std::uint64_t frames = 0, dropped = 0, lost = 0;
-  std::string waiting_for;  ///< "" or "waiting for <stream> since <stamp>"
+  std::string waiting_for;   ///< "" or what its frames wait for, or why it is not waited for
+  std::uint64_t images = 0;  ///< depth images that came
+};
+
+/// A robot that has gone, and why.
+struct RobotDeparture {
+  std::string name;
+  std::string reason;
+  StampNs wall_ns = 0;  ///< when it was noticed
 };
 
 struct IntakeStatus {
   std::vector<RobotStatus> robots;
+  std::vector<RobotDeparture> departures;  ///< the last few, latest last
   std::vector<ProblemCounter::Entry> problems;
 };
 
 /// Runs a thread of its own from construction to stop().
 class Intake {
  public:
-  /// `queue` must outlive it. Throws InputError for a bad topic or colour.
+  /// `watch` has listened on the participant from its first moment. It and `queue` must outlive the
+  /// intake. Throws InputError for a bad topic or colour.
   Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-         const ClassMap& classes, FrameQueue& queue);
+         const ClassMap& classes, BusWatch& watch, FrameQueue& queue);
   ~Intake();
 
   /// Takes what has arrived until now, hands every frame that it makes to the queue, and closes it.
@@ -42,21 +56,34 @@ class Intake {
   IntakeStatus status() const;
 
  private:
-  using TfReader = Reader<tf2_msgs::msg::TFMessagePubSubType>;
+  struct Robot {
+    std::unique_ptr<RobotInput> input;
+    bool named = false;      ///< by the configuration: stays when it has gone
+    bool announced = false;  ///< the roster has it
+  };
 
   void run();
   void step(bool last);
-  void drain_transforms(TfReader& reader, bool is_static);
+  void follow_roster();
+  void follow(const std::vector<RosterChange>& changes);
+  void meet(const std::string& name, const RobotConfig& config, bool named);
+  /// True when nothing of the robot is left here and it is to be erased.
+  bool see_off(const Robot& robot);
   void hand_over(bool last);
   void update_status();
 
-  const bool lossless_;
+  const std::shared_ptr<Participant> participant_;
+  const NodeConfig node_;
+  BusWatch& watch_;
   FrameQueue& queue_;
   Wakeup wakeup_;
   ColourTable colours_;
   ProblemCounter problems_;
-  std::vector<std::unique_ptr<RobotInput>> robots_;
-  TfReader tf_, tf_static_;
+  Roster roster_;
+  TransformTree transforms_;            ///< of the topics that all robots share
+  std::unique_ptr<TransformInput> tf_;  ///< null when every robot has its own
+  std::map<std::string, Robot> robots_;
+  std::deque<RobotDeparture> departures_;
   FrameMerger<Frame> merger_;
   std::atomic<bool> stopping_{false};
   mutable std::mutex status_mutex_;

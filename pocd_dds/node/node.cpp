@@ -24,12 +24,17 @@ constexpr double kStatusPeriodS = 1.0;
 
 double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
 
+BusOptions watched(BusOptions bus, BusWatch& watch) {
+  bus.listener = &watch;
+  return bus;
+}
+
 }  // namespace
 
 struct Node::Impl {
   explicit Impl(const NodeOptions& options)
       : config(options.config),
-        participant(std::make_shared<Participant>(options.bus)),
+        participant(std::make_shared<Participant>(watched(options.bus, watch))),
         pipeline(config.pipeline),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
@@ -38,7 +43,7 @@ struct Node::Impl {
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
-        intake(participant, config.node, config.pipeline.classes, queue),
+        intake(participant, config.node, config.pipeline.classes, watch, queue),
         worker([this] { work(); }) {}
 
   ~Impl() {
@@ -55,6 +60,7 @@ struct Node::Impl {
   bool finish();
 
   const NodeFile config;
+  BusWatch watch;  // outlives the participant
   const std::shared_ptr<Participant> participant;
   PocdPipeline pipeline;  // worker only
   FrameQueue queue;

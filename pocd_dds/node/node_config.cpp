@@ -32,13 +32,15 @@ std::vector<std::string> NodeConfig::inconsistencies() const {
       problems.push_back("robots: the name " + robot.name + " is used twice");
     }
   }
-  if (robots.size() > 1) {
-    for (const std::string* pattern : {&topics.depth, &topics.camera_info, &topics.segmentation,
-                                       &topics.color, &topics.odometry}) {
-      if (pattern->find("{robot}") == std::string::npos) {
-        problems.push_back("topics: \"" + *pattern + "\" lacks {robot}, and there are several");
+  if (robots.size() > 1 || discover_robots) {
+    for (const std::string& pattern : topics.of_each_robot()) {
+      if (pattern.find("{robot}") == std::string::npos) {
+        problems.push_back("topics: \"" + pattern + "\" lacks {robot}, and there are several");
       }
     }
+  }
+  if (topics.own_tf() != (topics.tf_static.find("{robot}") != std::string::npos)) {
+    problems.push_back("topics: tf and tf_static must both have {robot}, or neither");
   }
   return problems;
 }

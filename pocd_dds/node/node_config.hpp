@@ -61,6 +61,15 @@ struct TopicPatterns {
   std::string segmentation = topics::kSegmentation.name;
   std::string color = topics::kColor.name;
   std::string odometry = topics::kOdometry.name;
+  std::string tf = topics::kTf.name;
+  std::string tf_static = topics::kTfStatic.name;
+
+  /// The patterns that name a topic of one robot.
+  std::vector<std::string> of_each_robot() const {
+    return {depth, camera_info, segmentation, color, odometry};
+  }
+  /// Every robot has topics of its own for its transforms.
+  bool own_tf() const { return tf.find("{robot}") != std::string::npos; }
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -69,6 +78,8 @@ struct TopicPatterns {
     visit("segmentation", segmentation, "Class images, registered to depth.");
     visit("color", color, "Colour images, registered to depth.");
     visit("odometry", odometry, "Poses of the robot.");
+    visit("tf", tf, "Transforms that change; without {robot}, all robots share the topic.");
+    visit("tf_static", tf_static, "Transforms that do not; with {robot} where tf has it.");
   }
 };
 
@@ -109,6 +120,7 @@ struct RosOutputConfig {
 
 struct NodeConfig {
   std::vector<RobotConfig> robots;
+  bool discover_robots = false;
   TopicPatterns topics;
   std::string segmentation = "optional";
   std::string color = "absent";
@@ -118,6 +130,7 @@ struct NodeConfig {
   double extrapolation_s = 0.0;
   double max_pose_gap_s = 0.5;
   double merge_wait_s = 1.0;
+  double silent_wait_s = 10.0;
   int queue_frames = 8;
   bool lossless = false;
   double object_period_s = 0.1;
@@ -129,7 +142,10 @@ struct NodeConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("robots", robots, "The robots whose cameras are listened to.");
+    visit("robots", robots,
+          "The robots whose cameras are listened to; none: all that appear on the bus.");
+    visit("discover_robots", discover_robots,
+          "Beside the named robots, listen to all others that appear on the bus.");
     visit.group("topics", topics, "Names of the input topics on the bus; {robot} is the name.");
     visit("segmentation", segmentation, Choices{{"absent", "optional", "required"}},
           "Segmentation images: not looked at, waited for and gone on without, or necessary.");
@@ -145,6 +161,9 @@ struct NodeConfig {
           "Poses further apart than this are not interpolated between [s].");
     visit("merge_wait_s", merge_wait_s, Range{0.0, 60.0},
           "How far robots may run ahead of one that is late [s of data time].");
+    visit("silent_wait_s", silent_wait_s, Range{0.1, 3600.0},
+          "A robot that sends no image for so long is not waited for by the others, and, in a "
+          "lossless run, a silent stream not by its frames [s].");
     visit("queue_frames", queue_frames, Range{1, 10000},
           "Frames waiting for the pipeline; the oldest is dropped and counted.");
     visit("lossless", lossless,
@@ -163,6 +182,9 @@ struct NodeConfig {
           "How long to wait at the end for subscribers to acknowledge [s].");
   }
   std::vector<std::string> inconsistencies() const;
+
+  /// Robots are found on the bus.
+  bool discovers() const { return robots.empty() || discover_robots; }
 };
 
 /// A configuration file: the pipeline's groups at the top, as for pocd_map, and the group `node`.

@@ -1,5 +1,7 @@
 #include "pocd_dds/node/robot_input.hpp"
 
+#include <algorithm>
+#include <cstdio>
 #include <utility>
 
 #include "pocd/common/check.hpp"
@@ -7,13 +9,19 @@
 namespace pocd::dds {
 namespace {
 
-using Stream = TimeSynchronizer::Stream;
-
 // In a replay without loss the reader's history is the buffer that holds the player back.
 constexpr Delivery kLosslessImages{true, false, 0, 8, 0, false, 0};
 constexpr Delivery kLosslessSmall{true, false, 0, 1000, 0, false, 0};
 // Depth images that wait for something; the synchroniser would drop beyond twice as many.
 constexpr std::size_t kHoldDepth = 32;
+
+double seconds(RobotInput::Clock::duration time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+std::string whole_seconds(double seconds) {
+  return std::to_string(static_cast<long>(seconds)) + " s";
+}
 
 StampNs nanoseconds(double seconds) { return static_cast<StampNs>(seconds * 1e9); }
 
@@ -34,7 +42,7 @@ SynchronizerConfig synchronizer_config(const NodeConfig& node, const RobotConfig
   return config;
 }
 
-std::string topic_of(const std::string& own, const std::string& pattern, const RobotConfig& robot) {
+std::string name_of(const std::string& own, const std::string& pattern, const RobotConfig& robot) {
   return own.empty() ? robot_topic(pattern, robot.name) : own;
 }
 
@@ -46,19 +54,25 @@ Delivery delivery_of(const TopicSpec& spec, bool lossless, const Delivery& inste
 
 RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
                        const RobotConfig& robot, const ColourTable& colours,
-                       ProblemCounter& problems, Wakeup& wakeup)
+                       const TransformTree& shared, ProblemCounter& problems, Wakeup& wakeup)
     : robot_(robot),
+      map_frame_(node.map_frame),
       lossless_(node.lossless),
-      camera_frame_known_(!robot.camera_frame.empty()),
+      silent_wait_s_(node.silent_wait_s),
+      camera_frame_(robot.camera_frame),
       colours_(colours),
       problems_(problems),
-      transforms_(nanoseconds(node.max_pose_gap_s)),
+      transforms_(nanoseconds(node.max_pose_gap_s), 1000, &shared),
       synchronizer_(synchronizer_config(node, robot), transforms_),
+      tf_(node.topics.own_tf() ? std::make_unique<TransformInput>(
+                                     participant, robot_topic(node.topics.tf, robot.name),
+                                     robot_topic(node.topics.tf_static, robot.name), wakeup)
+                               : nullptr),
       odometry_(participant, topics::kOdometry,
-                topic_of(robot.odometry_topic, node.topics.odometry, robot),
+                name_of(robot.odometry_topic, node.topics.odometry, robot),
                 delivery_of(topics::kOdometry, node.lossless, kLosslessSmall), wakeup),
       camera_info_(participant, topics::kCameraInfo,
-                   topic_of(robot.camera_info_topic, node.topics.camera_info, robot),
+                   name_of(robot.camera_info_topic, node.topics.camera_info, robot),
                    delivery_of(topics::kCameraInfo, node.lossless, kLosslessSmall), wakeup) {
   const auto image_reader = [&](const TopicSpec& spec, const std::string& topic) {
     return std::make_unique<ImageReader>(participant, spec, topic,
@@ -66,32 +80,42 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
   };
   if (node.segmentation != "absent") {
     segmentation_ = image_reader(
-        topics::kSegmentation, topic_of(robot.segmentation_topic, node.topics.segmentation, robot));
+        topics::kSegmentation, name_of(robot.segmentation_topic, node.topics.segmentation, robot));
     segmentation_required_ = node.segmentation == "required";
   }
   if (node.color != "absent") {
-    color_ = image_reader(topics::kColor, topic_of(robot.color_topic, node.topics.color, robot));
+    color_ = image_reader(topics::kColor, name_of(robot.color_topic, node.topics.color, robot));
     color_required_ = node.color == "required";
   }
-  depth_ = image_reader(topics::kDepth, topic_of(robot.depth_topic, node.topics.depth, robot));
+  depth_ = image_reader(topics::kDepth, name_of(robot.depth_topic, node.topics.depth, robot));
   if (robot.mount.given) {
     const MountConfig& mount = robot.mount;
     mount_.position = {mount.x_m, mount.y_m, mount.z_m};
     mount_.rotation = Eigen::Quaterniond(mount.qw, mount.qx, mount.qy, mount.qz).normalized();
-    if (camera_frame_known_) transforms_.set_static(mount.base_frame, robot.camera_frame, mount_);
+    if (!camera_frame_.empty()) transforms_.set_static(mount.base_frame, camera_frame_, mount_);
   }
 }
 
 void RobotInput::drain(bool hold) {
   // Looked at before the taking: what a source that has gone had sent is with the readers by then.
   const bool live_before = live();
+  if (live_before && !had_source_) heard(Stream::kDepth);  // silence begins now
   had_source_ = had_source_ || live_before;
   source_left_ = had_source_ && !live_before && !hold;
   drain_poses();
+  drain_camera_info();
+  if (hold) return;
+  if (segmentation_) drain_images(Stream::kSegmentation, *segmentation_);
+  if (color_) drain_images(Stream::kColor, *color_);
+  drain_images(Stream::kDepth, *depth_);
+}
+
+void RobotInput::drain_camera_info() {
   sensor_msgs::msg::CameraInfo info;
   SampleMeta meta;
   while (camera_info_.take(info, meta)) {
     if (!meta.valid) continue;
+    heard(Stream::kCameraInfo);
     const Checked<CameraModel> camera = camera_from(info);
     if (camera.problem) {
       problems_.count(camera_info_.topic(), *camera.problem);
@@ -99,13 +123,10 @@ void RobotInput::drain(bool hold) {
       problems_.count(camera_info_.topic(), backwards(info.header()));
     }
   }
-  if (hold) return;
-  if (segmentation_) drain_images(Stream::kSegmentation, *segmentation_);
-  if (color_) drain_images(Stream::kColor, *color_);
-  drain_images(Stream::kDepth, *depth_);
 }
 
 void RobotInput::drain_poses() {
+  if (tf_ && tf_->drain(transforms_, problems_)) heard(Stream::kPose);
   nav_msgs::msg::Odometry message;
   SampleMeta meta;
   while (odometry_.take(message, meta)) {
@@ -115,24 +136,14 @@ void RobotInput::drain_poses() {
       problems_.count(odometry_.topic(), *pose.problem);
       continue;
     }
+    heard(Stream::kPose);
     const StampedTransform& T = *pose.value;
-    odometry_children_.insert(T.child);
-    if (!transforms_.add(T.parent, T.child, T.stamp_ns, T.T)) {
-      problems_.count(odometry_.topic(), backwards(message.header()));
-    } else {
+    const auto problem = transforms_.add(T.parent, T.child, T.stamp_ns, T.T);
+    if (problem) problems_.count(odometry_.topic(), *problem);
+    if (!problem || problem->reason != InputReason::kStampBackwards) {
       synchronizer_.pose_seen(T.stamp_ns);
     }
   }
-}
-
-bool RobotInput::add_transform(const StampedTransform& transform, bool is_static) {
-  if (is_static) {
-    transforms_.set_static(transform.parent, transform.child, transform.T);
-    return true;
-  }
-  // Odometry says the same on a topic of its own; two sources of one transform would interleave.
-  if (odometry_children_.count(transform.child) > 0) return true;
-  return transforms_.add(transform.parent, transform.child, transform.stamp_ns, transform.T);
 }
 
 void RobotInput::drain_images(Stream stream, ImageReader& reader) {
@@ -142,7 +153,10 @@ void RobotInput::drain_images(Stream stream, ImageReader& reader) {
     const bool enough = stream == Stream::kDepth && synchronizer_.pending() >= kHoldDepth;
     if (lossless_ && enough && !source_left_) return;
     if (!reader.take(message, meta)) return;
-    if (meta.valid) add_image(stream, message, reader.topic());
+    if (!meta.valid) continue;
+    heard(stream);
+    images_ += stream == Stream::kDepth;
+    add_image(stream, message, reader.topic());
   }
 }
 
@@ -171,20 +185,78 @@ void RobotInput::add_image(Stream stream, const sensor_msgs::msg::Image& message
   }
   segmentation_delivers_ = segmentation_delivers_ || stream == Stream::kSegmentation;
   color_delivers_ = color_delivers_ || stream == Stream::kColor;
-  if (stream == Stream::kDepth && !camera_frame_known_) {
-    if (message.header().frame_id().empty()) {
-      problems_.count(topic, {InputReason::kEmptyFrameName, "header.frame_id is empty"});
-      return;
-    }
-    camera_frame_known_ = true;
-    synchronizer_.set_camera_frame(message.header().frame_id());
-    if (robot_.mount.given) {
-      transforms_.set_static(robot_.mount.base_frame, message.header().frame_id(), mount_);
-    }
-  }
+  if (stream == Stream::kDepth && !accept_camera_frame(message.header().frame_id(), topic)) return;
   if (!synchronizer_.add_image(stream, to_stamp(message.header().stamp()), std::move(image))) {
     problems_.count(topic, backwards(message.header()));
   }
+}
+
+bool RobotInput::accept_camera_frame(const std::string& frame, const std::string& topic) {
+  if (!robot_.camera_frame.empty() || frame == camera_frame_) return true;
+  if (frame.empty()) {
+    problems_.count(topic, {InputReason::kEmptyFrameName, "header.frame_id is empty"});
+    return false;
+  }
+  if (!camera_frame_.empty()) {
+    problems_.count(topic,
+                    {InputReason::kFrameChanged, "header.frame_id was \"" + camera_frame_ +
+                                                     "\", now \"" + frame + "\": image not used"});
+    return false;
+  }
+  camera_frame_ = frame;
+  synchronizer_.set_camera_frame(frame);
+  if (robot_.mount.given) transforms_.set_static(robot_.mount.base_frame, frame, mount_);
+  return true;
+}
+
+void RobotInput::heard(Stream stream) {
+  heard_[stream] = Clock::now();
+  if (given_up_ == stream) given_up_.reset();
+}
+
+// Without loss, a frame is waited for as long as its streams have a source. One that is announced
+// but says nothing, while the sender of the depth images is held back, must not hold it for ever.
+void RobotInput::judge_silence() {
+  const std::optional<Stream> blocker = synchronizer_.blocked_by();
+  const auto now = Clock::now();
+  if (!blocker || synchronizer_.pending() < kHoldDepth) {
+    moved_on_ = now;
+    return;
+  }
+  const auto since = std::max(moved_on_, heard_[*blocker]);
+  if (!lossless_ || given_up_ || seconds(now - since) < silent_wait_s_) return;
+  given_up_ = blocker;
+  problems_.count(topic_of(*blocker),
+                  {InputReason::kSilentStream,
+                   "nothing came for " + whole_seconds(silent_wait_s_) + " while " +
+                       std::to_string(synchronizer_.pending()) + " depth images of " + name() +
+                       " waited for it: not waited for until it comes"});
+}
+
+std::string RobotInput::topic_of(Stream stream) const {
+  switch (stream) {
+    case Stream::kDepth:
+      return depth_->topic();
+    case Stream::kSegmentation:
+      return segmentation_ ? segmentation_->topic() : "";
+    case Stream::kColor:
+      return color_ ? color_->topic() : "";
+    case Stream::kCameraInfo:
+      return camera_info_.topic();
+    case Stream::kPose:
+      return odometry_.topic();
+  }
+  return "";
+}
+
+double RobotInput::silent_s() const {
+  const auto last = heard_.find(Stream::kDepth);
+  return live() && last != heard_.end() ? seconds(Clock::now() - last->second) : 0.0;
+}
+
+std::string RobotInput::waiting_for() const {
+  if (given_up_) return "going on without " + topic_of(*given_up_) + ", which is silent";
+  return synchronizer_.waiting_for();
 }
 
 InputProblem RobotInput::backwards(const std_msgs::msg::Header& header) {
@@ -198,11 +270,23 @@ std::vector<Frame> RobotInput::take(bool last_call) {
   const bool segmentation_comes = !segmentation_ || segmentation_required_ ||
                                   (segmentation_delivers_ && segmentation_->matched() > 0);
   const bool color_comes = !color_ || color_required_ || (color_delivers_ && color_->matched() > 0);
-  synchronizer_.set_patient(lossless_ && segmentation_comes && color_comes);
+  judge_silence();
+  const bool image_given_up = given_up_ == Stream::kSegmentation || given_up_ == Stream::kColor;
+  synchronizer_.set_missing(image_given_up ? given_up_ : std::nullopt);
+  synchronizer_.set_patient(lossless_ && segmentation_comes && color_comes &&
+                            (!given_up_ || image_given_up));
 
   std::vector<Frame> frames;
   const std::vector<SyncedFrame> ready =
       last_call || source_left_ ? synchronizer_.flush() : synchronizer_.take();
+  if (!ready.empty()) {
+    moved_on_ = Clock::now();
+    // Every frame has a pose and intrinsics.
+    if (given_up_ == Stream::kPose || given_up_ == Stream::kCameraInfo) given_up_.reset();
+  }
+  if (const auto problem = synchronizer_.take_pose_problem()) {
+    problems_.count(depth_->topic(), *problem);
+  }
   for (const SyncedFrame& synced : ready) {
     try {
       Frame frame = make_frame(synced.stamp_ns, synced.camera, synced.T_W_C, synced.depth,
@@ -218,13 +302,17 @@ std::vector<Frame> RobotInput::take(bool last_call) {
   return frames;
 }
 
-bool RobotInput::settle_departure() {
-  if (!source_left_) return false;
+std::optional<std::vector<std::string>> RobotInput::settle_departure() {
+  if (!source_left_) return std::nullopt;
+  std::vector<std::string> frames = transforms_.chain(map_frame_, camera_frame_);
   had_source_ = source_left_ = false;
   segmentation_delivers_ = color_delivers_ = false;
   synchronizer_.restart();
   transforms_.forget_moving();
-  return true;
+  heard_.clear();
+  given_up_.reset();
+  if (robot_.camera_frame.empty()) camera_frame_.clear();
+  return frames;
 }
 
 std::uint64_t RobotInput::dropped() const {

@@ -1,8 +1,9 @@
 // The streams of one robot: readers, checks, synchroniser.
 #pragma once
 
+#include <chrono>
+#include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -12,68 +13,90 @@
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/node/node_config.hpp"
+#include "pocd_dds/node/transform_input.hpp"
 #include "sensor_msgsPubSubTypes.h"
 
 namespace pocd::dds {
 
-/// Used by the intake thread only.
+/// Used by the intake thread only. Clocks are read only to tell how long a stream has been silent.
 class RobotInput {
  public:
-  /// `colours`, `problems` and `wakeup` must outlive it.
+  using Clock = std::chrono::steady_clock;
+
+  /// `shared` has the transforms of the topics that all robots share. It, `colours`, `problems` and
+  /// `wakeup` must outlive it. Throws InputError naming the topic when there can be no reader.
   RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-             const RobotConfig& robot, const ColourTable& colours, ProblemCounter& problems,
-             Wakeup& wakeup);
+             const RobotConfig& robot, const ColourTable& colours, const TransformTree& shared,
+             ProblemCounter& problems, Wakeup& wakeup);
 
   const std::string& name() const { return robot_.name; }
 
   /// Takes what has arrived. `hold`: leaves images with their readers, to hold the sender back.
   void drain(bool hold);
-  /// A transform from tf or tf_static. False when its stamp jumped backwards.
-  bool add_transform(const StampedTransform& transform, bool is_static);
 
   /// Frames that are ready, by stamp. Once the source of the images has gone, or with `last_call`,
   /// nothing is waited for any more.
   std::vector<Frame> take(bool last_call);
 
-  /// After take(): true once when the source of depth images has gone and nothing of it is left.
-  /// The next source may start at any stamp.
-  bool settle_departure();
+  /// After take(): once when the source of depth images has gone and nothing of it is left, the
+  /// robot's frames from the camera up to the map, as far as they are known. The next source may
+  /// start at any stamp.
+  std::optional<std::vector<std::string>> settle_departure();
+
+  /// No departed source has left anything to be settled.
+  bool settled() const { return !had_source_; }
 
   /// A source of depth images is there.
   bool live() const { return depth_->matched() > 0; }
+  /// How long no depth image has come although there is a source [s]; 0 without one.
+  double silent_s() const;
+
   StampNs watermark_ns() const { return synchronizer_.watermark_ns(); }
+  /// Depth images that came, good or bad.
+  std::uint64_t images() const { return images_; }
   std::uint64_t frames() const { return frames_; }
   /// Frames that were dropped for something they lacked.
   std::uint64_t dropped() const;
   /// Images that the bus says were lost on the way.
   std::uint64_t lost() const;
-  std::string waiting_for() const { return synchronizer_.waiting_for(); }
+  /// What its frames wait for, or go on without; "" when nothing is wrong.
+  std::string waiting_for() const;
   const SynchronizerCounts& counts() const { return synchronizer_.counts(); }
 
  private:
   using ImageReader = Reader<sensor_msgs::msg::ImagePubSubType>;
+  using Stream = TimeSynchronizer::Stream;
 
   void drain_poses();
-  void drain_images(TimeSynchronizer::Stream stream, ImageReader& reader);
-  void add_image(TimeSynchronizer::Stream stream, const sensor_msgs::msg::Image& message,
-                 const std::string& topic);
+  void drain_camera_info();
+  void drain_images(Stream stream, ImageReader& reader);
+  void add_image(Stream stream, const sensor_msgs::msg::Image& message, const std::string& topic);
+  bool accept_camera_frame(const std::string& frame, const std::string& topic);
+  void heard(Stream stream);
+  void judge_silence();
+  std::string topic_of(Stream stream) const;
   static InputProblem backwards(const std_msgs::msg::Header& header);
 
   RobotConfig robot_;
-  bool lossless_;
-  bool camera_frame_known_;
+  const std::string map_frame_;
+  const bool lossless_;
+  const double silent_wait_s_;
+  std::string camera_frame_;  ///< "" until the first depth image
   const ColourTable& colours_;
   ProblemCounter& problems_;
   TransformTree transforms_;
   TimeSynchronizer synchronizer_;
   PoseQuaternion mount_;
-  std::set<std::string> odometry_children_;
   bool had_source_ = false, source_left_ = false;
-  std::uint64_t frames_ = 0;
+  std::uint64_t frames_ = 0, images_ = 0;
   std::uint64_t refused_ = 0;
   bool segmentation_required_ = false, color_required_ = false;
   bool segmentation_delivers_ = false, color_delivers_ = false;
+  std::map<Stream, Clock::time_point> heard_;
+  Clock::time_point moved_on_ = Clock::now();  ///< a frame came out, or few wait
+  std::optional<Stream> given_up_;             ///< a silent stream that is not waited for any more
 
+  std::unique_ptr<TransformInput> tf_;  ///< of its own; null when the robots share the topics
   Reader<nav_msgs::msg::OdometryPubSubType> odometry_;
   Reader<sensor_msgs::msg::CameraInfoPubSubType> camera_info_;
   std::unique_ptr<ImageReader> segmentation_, color_;

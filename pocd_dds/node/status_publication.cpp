@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <map>
 
 #include "pocd_dds/bridge/conversions.hpp"
 
@@ -60,6 +61,17 @@ std::array<std::uint8_t, 16> node_key(std::uint64_t epoch) {
   return object_uuid(epoch, ObjectId::kNone);
 }
 
+/// One status for every robot that has gone and is not back.
+void add_departed(const IntakeStatus& intake, const std::string& node,
+                  diagnostic_msgs::msg::DiagnosticArray& diagnostics) {
+  std::map<std::string, std::string> gone;
+  for (const RobotDeparture& departure : intake.departures) gone[departure.name] = departure.reason;
+  for (const RobotStatus& robot : intake.robots) gone.erase(robot.name);
+  for (const auto& [name, reason] : gone) {
+    diagnostics.status().push_back(status_of(kWarning, node + ": " + name, "has gone: " + reason));
+  }
+}
+
 }  // namespace
 
 StatusPublication::StatusPublication(const std::shared_ptr<Participant>& participant,
@@ -102,6 +114,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     entry.frames(robot.frames);
     entry.dropped(robot.dropped);
     entry.waiting_for(robot.waiting_for);
+    entry.present(robot.live);
     health.robots().push_back(entry);
 
     const std::string message = !robot.live                 ? "no source of depth images"
@@ -113,6 +126,14 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     add(status, "images lost on the bus", std::to_string(robot.lost));
     diagnostics.status().push_back(status);
   }
+  for (const RobotDeparture& departure : intake.departures) {
+    pocd_msgs::msg::RobotDeparture entry;
+    entry.name(departure.name);
+    entry.reason(departure.reason);
+    entry.stamp(to_time(departure.wall_ns));
+    health.departures().push_back(entry);
+  }
+  add_departed(intake, name_, diagnostics);
   health.frames_received(received);
   health.frames_dropped(dropped);
   for (const ProblemCounter::Entry& entry : intake.problems) {

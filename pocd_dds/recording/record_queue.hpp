@@ -1,15 +1,16 @@
 // Samples between the threads that receive and the one that writes.
 #pragma once
 
+#include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "pocd/recording/mcap_records.hpp"
+#include "pocd_dds/entities/closable_queue.hpp"
 
 namespace pocd::dds {
 
@@ -22,43 +23,19 @@ struct QueuedSample {
 /// system again and again. Thread-safe.
 class RecordQueue {
  public:
-  explicit RecordQueue(std::size_t most_bytes) : most_bytes_(most_bytes) {}
+  explicit RecordQueue(std::size_t most_bytes) : samples_(most_bytes) {}
 
   /// False, and counted, when there is no room.
   bool push(QueuedSample sample) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (bytes_ + sample.payload.size() > most_bytes_) {
-        ++dropped_;
-        return false;
-      }
-      bytes_ += sample.payload.size();
-      samples_.push_back(std::move(sample));
-    }
-    filled_.notify_one();
-    return true;
+    const std::size_t bytes = sample.payload.size();
+    const bool room = samples_.push_if_room(std::move(sample), bytes);
+    if (!room) ++dropped_;
+    return room;
   }
   /// Nothing after `time`, or at once when the queue is closed and empty.
-  std::optional<QueuedSample> pop(std::chrono::milliseconds time) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    filled_.wait_for(lock, time, [this] { return closed_ || !samples_.empty(); });
-    if (samples_.empty()) return std::nullopt;
-    QueuedSample sample = std::move(samples_.front());
-    samples_.pop_front();
-    bytes_ -= sample.payload.size();
-    return sample;
-  }
-  void close() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      closed_ = true;
-    }
-    filled_.notify_all();
-  }
-  bool finished() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return closed_ && samples_.empty();
-  }
+  std::optional<QueuedSample> pop(std::chrono::milliseconds time) { return samples_.pop(time); }
+  void close() { samples_.close(); }
+  bool finished() const { return samples_.finished(); }
 
   recording::Bytes buffer() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -73,24 +50,14 @@ class RecordQueue {
     if (spare_.size() < kMostSpare) spare_.push_back(std::move(bytes));
   }
 
-  std::size_t bytes() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return bytes_;
-  }
-  std::uint64_t dropped() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return dropped_;
-  }
+  std::size_t bytes() const { return samples_.weight(); }
+  std::uint64_t dropped() const { return dropped_; }
 
  private:
-  const std::size_t most_bytes_;
-  mutable std::mutex mutex_;
-  std::condition_variable filled_;
-  std::deque<QueuedSample> samples_;
+  ClosableQueue<QueuedSample> samples_;
+  std::mutex mutex_;  // of spare_
   std::vector<recording::Bytes> spare_;
-  std::size_t bytes_ = 0;
-  bool closed_ = false;
-  std::uint64_t dropped_ = 0;
+  std::atomic<std::uint64_t> dropped_{0};
 };
 
 }  // namespace pocd::dds

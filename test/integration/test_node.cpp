@@ -33,7 +33,7 @@ TEST(Node, EndsInOrderOnBothSignals) {
 TEST(Node, UsageErrorsAreOneLineAndExitCode2) {
   const std::string config = source("config/simulated.yaml");
   const std::vector<std::vector<std::string>> cases = {
-      {},
+      {"--config", config, "--set", "node.topics.depth=rt/depth"},
       {"--config", "missing.yaml", "--robot", "r"},
       {"--config", config, "--robot", "r", "--set", "node.queue_framez=3"},
       {"--config", config, "--robot", "r", "--set", "node.queue_frames=0"},
@@ -55,7 +55,8 @@ TEST(Node, UsageErrorsAreOneLineAndExitCode2) {
 }
 
 TEST(Commands, HelpShowsAnExample) {
-  for (const char* command : {"pocd_node", "pocd_play", "pocd_mirror", "pocd_health"}) {
+  for (const char* command :
+       {"pocd_node", "pocd_play", "pocd_mirror", "pocd_health", "pocd_doctor"}) {
     const CommandResult result = run_command({bin(command), "--help"});
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_NE(result.out.find("Example"), std::string::npos) << command;

@@ -8,11 +8,18 @@ namespace pocd {
 
 const char* to_string(PoseLookup result) {
   switch (result) {
-    case PoseLookup::kFound: return "found";
-    case PoseLookup::kTooNew: return "newer than the newest pose";
-    case PoseLookup::kTooOld: return "older than the oldest pose";
-    case PoseLookup::kGap: return "in a gap of the poses";
-    case PoseLookup::kEmpty: return "no pose";
+    case PoseLookup::kFound:
+      return "found";
+    case PoseLookup::kTooNew:
+      return "newer than the newest pose";
+    case PoseLookup::kTooOld:
+      return "older than the oldest pose";
+    case PoseLookup::kGap:
+      return "in a gap of the poses";
+    case PoseLookup::kEmpty:
+      return "without any pose";
+    case PoseLookup::kLoop:
+      return "in a loop of frames";
   }
   return "";
 }

@@ -13,8 +13,24 @@ namespace {
 std::string stamp_text(StampNs stamp_ns) {
   const StampNs billion = 1'000'000'000;
   std::string nanoseconds = std::to_string(std::abs(stamp_ns % billion));
-  return std::to_string(stamp_ns / billion) + "." +
-         std::string(9 - nanoseconds.size(), '0') + nanoseconds;
+  return std::to_string(stamp_ns / billion) + "." + std::string(9 - nanoseconds.size(), '0') +
+         nanoseconds;
+}
+
+const char* name_of(TimeSynchronizer::Stream stream) {
+  switch (stream) {
+    case TimeSynchronizer::Stream::kDepth:
+      return "depth";
+    case TimeSynchronizer::Stream::kSegmentation:
+      return "segmentation";
+    case TimeSynchronizer::Stream::kColor:
+      return "color";
+    case TimeSynchronizer::Stream::kCameraInfo:
+      return "camera_info";
+    case TimeSynchronizer::Stream::kPose:
+      return "pose";
+  }
+  return "";
 }
 
 }  // namespace
@@ -30,7 +46,7 @@ bool TimeSynchronizer::add_image(Stream stream, StampNs stamp_ns, cv::Mat image)
   if (newest != newest_ns_.end() && stamp_ns <= newest->second) return false;
   newest_ns_[stream] = stamp_ns;
   horizon_ns_ = std::max(horizon_ns_, stamp_ns);
-  POCD_CHECK(stream != Stream::kCameraInfo);
+  POCD_CHECK(stream != Stream::kCameraInfo && stream != Stream::kPose);
   auto& images = stream == Stream::kDepth          ? depth_
                  : stream == Stream::kSegmentation ? segmentation_
                                                    : color_;
@@ -57,7 +73,9 @@ bool TimeSynchronizer::add_camera_info(StampNs stamp_ns, const CameraModel& came
   return true;
 }
 
-void TimeSynchronizer::pose_seen(StampNs stamp_ns) { horizon_ns_ = std::max(horizon_ns_, stamp_ns); }
+void TimeSynchronizer::pose_seen(StampNs stamp_ns) {
+  horizon_ns_ = std::max(horizon_ns_, stamp_ns);
+}
 
 std::optional<cv::Mat> TimeSynchronizer::match(std::deque<std::pair<StampNs, cv::Mat>>& stream,
                                                StampNs stamp_ns) {
@@ -82,7 +100,7 @@ bool TimeSynchronizer::camera_at(StampNs stamp_ns, bool settle, CameraModel& cam
 
 std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
   std::vector<SyncedFrame> frames;
-  blocked_by_.clear();
+  blocked_by_.reset();
   while (!depth_.empty()) {
     const StampNs stamp_ns = depth_.front().first;
     const bool late = !patient_ && horizon_ns_ - stamp_ns > config_.max_wait_ns;
@@ -97,14 +115,14 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
     };
     // True when the frame may go on as far as this stream is concerned.
     const auto fetch = [&](StreamUse use, Stream stream, auto& images, cv::Mat& out,
-                           std::uint64_t& without, std::uint64_t& dropped, const char* name) {
+                           std::uint64_t& without, std::uint64_t& dropped) {
       if (use == StreamUse::kAbsent) return true;
       if (auto image = match(images, stamp_ns)) {
         out = std::move(*image);
         return true;
       }
-      if (!settle && !passed(stream)) {
-        blocked_by_ = name;
+      if (!settle && !passed(stream) && missing_ != stream) {
+        blocked_by_ = stream;
         return false;
       }
       if (use == StreamUse::kRequired) {
@@ -117,31 +135,36 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
 
     if (!camera_at(stamp_ns, settle || passed(Stream::kCameraInfo), frame.camera)) {
       if (!settle && !passed(Stream::kCameraInfo)) {
-        blocked_by_ = "camera_info";
+        blocked_by_ = Stream::kCameraInfo;
         break;
       }
       drop = &counts_.dropped_no_camera_info;
     }
     if (drop == nullptr) {
-      const TransformLookup pose =
-          transforms_.lookup(config_.map_frame, config_.camera_frame, stamp_ns,
-                             settle ? config_.extrapolation_ns : 0);
+      const TransformLookup pose = transforms_.lookup(
+          config_.map_frame, config_.camera_frame, stamp_ns, settle ? config_.extrapolation_ns : 0);
       if (pose.result == PoseLookup::kFound) {
         frame.T_W_C = pose.T_target_source;
       } else if (!settle &&
                  (pose.result == PoseLookup::kTooNew || pose.result == PoseLookup::kEmpty)) {
-        blocked_by_ = "pose (" + pose.edge + ")";
+        blocked_by_ = Stream::kPose;
+        blocking_edge_ = pose.edge;
         break;
       } else {
         drop = &counts_.dropped_no_pose;
+        // Images from before the first pose, and the last ones of a run, are nobody's mistake.
+        if (!last_call && pose.result != PoseLookup::kTooOld) {
+          pose_problem_ =
+              transforms_.explain(config_.map_frame, config_.camera_frame, stamp_ns, pose);
+        }
       }
     }
     const SynchronizerCounts before = counts_;
     if (drop == nullptr &&
         !(fetch(config_.segmentation, Stream::kSegmentation, segmentation_, frame.labels,
-                counts_.without_segmentation, counts_.dropped_no_segmentation, "segmentation") &&
+                counts_.without_segmentation, counts_.dropped_no_segmentation) &&
           fetch(config_.color, Stream::kColor, color_, frame.color, counts_.without_color,
-                counts_.dropped_no_color, "color"))) {
+                counts_.dropped_no_color))) {
       // A frame that still waits for colour has not gone on without segmentation yet.
       counts_.without_segmentation = before.without_segmentation;
       break;
@@ -174,8 +197,9 @@ std::vector<SyncedFrame> TimeSynchronizer::flush() { return run(true); }
 
 std::string TimeSynchronizer::waiting_for() const {
   if (depth_.empty()) return "";
-  return "waiting for " + (blocked_by_.empty() ? std::string("its turn") : blocked_by_) + " since " +
-         stamp_text(depth_.front().first);
+  std::string stream = blocked_by_ ? name_of(*blocked_by_) : "its turn";
+  if (blocked_by_ == Stream::kPose) stream += " (" + blocking_edge_ + ")";
+  return "waiting for " + stream + " since " + stamp_text(depth_.front().first);
 }
 
 }  // namespace pocd

@@ -1,24 +1,59 @@
 #include "pocd/input/transform_tree.hpp"
 
+#include <algorithm>
+#include <cstdio>
 #include <iterator>
+#include <set>
 
 namespace pocd {
+namespace {
 
-TransformTree::TransformTree(StampNs max_gap_ns, std::size_t capacity)
-    : max_gap_ns_(max_gap_ns), capacity_(capacity) {}
-
-void TransformTree::set_static(const std::string& parent, const std::string& child,
-                               const PoseQuaternion& T) {
-  edges_.insert_or_assign(child, Edge{parent, true, T, PoseBuffer(max_gap_ns_, capacity_)});
+std::string seconds_text(StampNs stamp_ns) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3f s", static_cast<double>(stamp_ns) * 1e-9);
+  return text;
 }
 
-bool TransformTree::add(const std::string& parent, const std::string& child, StampNs stamp_ns,
-                        const PoseQuaternion& T) {
+InputProblem parent_changed(const std::string& child, const std::string& old_parent,
+                            const std::string& parent) {
+  return {InputReason::kParentChanged,
+          "frame \"" + child + "\" had parent \"" + old_parent + "\", now \"" + parent + "\""};
+}
+
+}  // namespace
+
+TransformTree::TransformTree(StampNs max_gap_ns, std::size_t capacity, const TransformTree* shared)
+    : max_gap_ns_(max_gap_ns), capacity_(capacity), shared_(shared) {}
+
+std::optional<InputProblem> TransformTree::set_static(const std::string& parent,
+                                                      const std::string& child,
+                                                      const PoseQuaternion& T) {
+  std::optional<InputProblem> problem;
+  const auto edge = edges_.find(child);
+  if (edge != edges_.end() && edge->second.parent != parent) {
+    problem = parent_changed(child, edge->second.parent, parent);
+  }
+  edges_.insert_or_assign(child, Edge{parent, true, T, PoseBuffer(max_gap_ns_, capacity_)});
+  return problem;
+}
+
+std::optional<InputProblem> TransformTree::add(const std::string& parent, const std::string& child,
+                                               StampNs stamp_ns, const PoseQuaternion& T) {
+  std::optional<InputProblem> problem;
   auto edge = edges_.find(child);
   if (edge == edges_.end() || edge->second.parent != parent || edge->second.is_static) {
+    if (edge != edges_.end() && edge->second.parent != parent) {
+      problem = parent_changed(child, edge->second.parent, parent);
+    }
     edge = edges_.insert_or_assign(child, Edge{parent, false, {}, {max_gap_ns_, capacity_}}).first;
   }
-  return edge->second.buffer.add(stamp_ns, T);
+  if (!edge->second.buffer.add(stamp_ns, T)) {
+    return InputProblem{InputReason::kStampBackwards,
+                        parent + " -> " + child + ": stamp " + std::to_string(stamp_ns) +
+                            " ns is before the last one, " +
+                            std::to_string(edge->second.buffer.newest_ns())};
+  }
+  return problem;
 }
 
 void TransformTree::forget_moving() {
@@ -27,33 +62,101 @@ void TransformTree::forget_moving() {
   }
 }
 
+void TransformTree::forget_moving(const std::vector<std::string>& frames) {
+  std::vector<std::string> gone;
+  for (const auto& [child, edge] : edges_) {
+    if (edge.is_static) continue;
+    for (const std::string& frame : chain("", child)) {
+      if (std::find(frames.begin(), frames.end(), frame) == frames.end()) continue;
+      gone.push_back(child);
+      break;
+    }
+  }
+  for (const std::string& child : gone) edges_.erase(child);
+}
+
+std::vector<std::string> TransformTree::chain(const std::string& target,
+                                              const std::string& source) const {
+  std::vector<std::string> frames;
+  std::string frame = source;
+  for (std::size_t steps = 0; frame != target && steps <= size(); ++steps) {
+    frames.push_back(frame);
+    const Edge* edge = find(frame);
+    if (edge == nullptr) break;
+    frame = edge->parent;
+  }
+  return frames;
+}
+
+const TransformTree::Edge* TransformTree::find(const std::string& child) const {
+  const auto found = edges_.find(child);
+  if (found != edges_.end()) return &found->second;
+  return shared_ == nullptr ? nullptr : shared_->find(child);
+}
+
 TransformLookup TransformTree::lookup(const std::string& target, const std::string& source,
                                       StampNs stamp_ns, StampNs extrapolation_ns) const {
   TransformLookup answer;
   std::string frame = source;
-  // A chain longer than the number of edges has a loop.
+  const std::size_t most_steps = size();
   for (std::size_t steps = 0; frame != target; ++steps) {
-    const auto found = edges_.find(frame);
-    if (found == edges_.end() || steps > edges_.size()) {
+    const Edge* edge = find(frame);
+    if (edge == nullptr) {
       answer.result = PoseLookup::kEmpty;
       answer.edge = "? -> " + frame;
       return answer;
     }
-    const Edge& edge = found->second;
-    PoseQuaternion pose = edge.constant;
-    if (!edge.is_static) {
-      const PoseLookup result = edge.buffer.at(stamp_ns, extrapolation_ns, pose);
-      if (result != PoseLookup::kFound) {
-        answer.result = result;
-        answer.edge = edge.parent + " -> " + frame;
-        return answer;
-      }
+    answer.edge = edge->parent + " -> " + frame;
+    if (steps > most_steps) {  // longer than there are edges
+      answer.result = PoseLookup::kLoop;
+      return answer;
+    }
+    PoseQuaternion pose = edge->constant;
+    if (!edge->is_static) {
+      answer.result = edge->buffer.at(stamp_ns, extrapolation_ns, pose);
+      if (answer.result != PoseLookup::kFound) return answer;
     }
     answer.T_target_source = to_pose(pose) * answer.T_target_source;
-    frame = edge.parent;
+    frame = edge->parent;
   }
   answer.result = PoseLookup::kFound;
+  answer.edge.clear();
   return answer;
+}
+
+InputProblem TransformTree::explain(const std::string& target, const std::string& source,
+                                    StampNs stamp_ns, const TransformLookup& failure) const {
+  std::string chain = source, frame = source;
+  const Edge* last = nullptr;
+  std::set<std::string> passed;
+  while (frame != target && passed.insert(frame).second) {
+    const Edge* edge = find(frame);
+    if (edge == nullptr) break;
+    chain += " <- " + edge->parent;
+    last = edge;
+    if (failure.result != PoseLookup::kLoop && edge->parent + " -> " + frame == failure.edge) break;
+    frame = edge->parent;
+  }
+  switch (failure.result) {
+    case PoseLookup::kEmpty:
+      return {InputReason::kNoTransform, "no transform leads from \"" + source + "\" to \"" +
+                                             target + "\": nobody says where \"" + frame +
+                                             "\" is (" + chain + ")"};
+    case PoseLookup::kLoop:
+      return {InputReason::kTransformLoop,
+              "frames go round in a loop and never reach \"" + target + "\": " + chain};
+    case PoseLookup::kTooNew:
+      return {InputReason::kNoPose,
+              failure.edge + ": newest pose is of " +
+                  (last == nullptr ? std::string("?") : seconds_text(last->buffer.newest_ns())) +
+                  ", the image of " + seconds_text(stamp_ns)};
+    case PoseLookup::kTooOld:
+    case PoseLookup::kGap:
+    case PoseLookup::kFound:
+      break;
+  }
+  return {InputReason::kNoPose, failure.edge + ": the image of " + seconds_text(stamp_ns) + " is " +
+                                    to_string(failure.result)};
 }
 
 }  // namespace pocd

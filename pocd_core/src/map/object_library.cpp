@@ -132,6 +132,7 @@ ObjectSnapshot snapshot(const LibraryObject& object) {
   s.last_seen_ns = object.last_seen_ns;
   s.observations = object.observations;
   s.last_robot = object.last_robot;
+  s.seen_by.assign(object.seen_by.begin(), object.seen_by.end());
   return s;
 }
 

@@ -68,6 +68,7 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   survivor.icp_target.reset();
   survivor.most_surfels = std::max(survivor.most_surfels, survivor.model.surfels().size());
   survivor.observations += absorbed.observations;
+  survivor.seen_by.insert(absorbed.seen_by.begin(), absorbed.seen_by.end());
   survivor.verified_ns = std::max(survivor.verified_ns, absorbed.verified_ns);
   survivor.last_seen_ns = std::max(survivor.last_seen_ns, absorbed.last_seen_ns);
   survivor.companions.clear();
@@ -134,7 +135,7 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found,
   const std::optional<ObjectId> absorbed =
       found.confirmed ? std::make_optional(found.id) : std::nullopt;
   if (absorbed) step.result.retired.push_back(*absorbed);
-  take_identity(step, found, from.id, from.first_seen_ns);
+  take_identity(step, found, from.id, from.first_seen_ns, from.seen_by);
   found.confirmed = true;
   found.added_ns.reset();
   found.reported_box = found.box;
@@ -155,7 +156,7 @@ bool ObjectTracker::notable_change(const LibraryObject& object) const {
 }
 
 void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id,
-                                  StampNs first_seen_ns) {
+                                  StampNs first_seen_ns, const std::set<std::string>& seen_by) {
   const ObjectId old = object.id;
   step.map.reassign_object(old, id);
   for (auto& owner : step.owner_of_observation) {
@@ -165,6 +166,7 @@ void ObjectTracker::take_identity(Step& step, LibraryObject& object, ObjectId id
     step.evidence[id] = it->second;
   library_.rename(old, id);
   object.first_seen_ns = first_seen_ns;
+  object.seen_by.insert(seen_by.begin(), seen_by.end());
   object.changed = false;  // it was listed under its old id
   auto& retired = step.result.retired;
   retired.erase(std::remove(retired.begin(), retired.end(), id), retired.end());
@@ -181,7 +183,8 @@ void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule,
                                          object.first_seen_ns,
                                          object.verified_ns,
                                          object.contested_since_ns,
-                                         step.frame.stamp_ns};
+                                         step.frame.stamp_ns,
+                                         object.seen_by};
   if (object.confirmed && !successor) {
     add_event(step, EventKind::kRemoved, object, rule);
     step.result.retired.push_back(id);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "pocd/change/geometric_change.hpp"
 
@@ -106,7 +108,7 @@ void ObjectTracker::update_matched(Step& step) {
     const Sighting& sighting = candidates_[match.candidate].sighting;
     const Observation& observation = step.observations.list[match.observation];
     object.frames_seen_through = 0;
-    ++object.frames_in_view;
+    if (moment_of(step, object).robots.size() == 1) ++object.frames_in_view;
     if (config_.association.realign_displaced && match.stationary && object.confirmed &&
         shift_object(step, object, match, sighting)) {
       continue;
@@ -120,8 +122,7 @@ void ObjectTracker::update_matched(Step& step) {
     }
     const double delta_m =
         geometric_change(object, observation, sighting, match, step.cloud, config_.change);
-    step.evidence[object.id] =
-        apply_measurement(object, delta_m, sighting, config_.state, config_.change);
+    measure(step, object, delta_m, sighting);
     mark_changed(object);
     if (match.displacement_m <= verified_m && std::abs(delta_m) <= verified_m) {
       fuse(step, object, match.observation);
@@ -160,11 +161,13 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
     object.frames_displaced = 0;
     // What lies beside the surface for a while may be the object, turned, of which too little is
     // seen yet to tell: fused, it would make the two places one model.
-    object.frames_odd = suspicious ? object.frames_odd + 1 : 0;
+    const int looks = moment_of(step, object).robots.size() == 1 ? 1 : 0;
+    object.frames_odd = suspicious ? object.frames_odd + looks : 0;
     return suspicious && object.frames_odd <= kOddFrames;
   }
   // Not fused: it would smear the model between the two places.
-  if (++object.frames_displaced < kDisplacedFrames) return true;
+  if (moment_of(step, object).robots.size() == 1) ++object.frames_displaced;
+  if (object.frames_displaced < kDisplacedFrames) return true;
   object.frames_displaced = 0;
   const OrientedBox previous_box = object.box;
   object.model.transform(moved->T_new_old);
@@ -176,10 +179,50 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
                                                sighting, config_.state, config_.change);
   // Change is measured from the new place on.
   step.evidence[object.id].after.mu = object.belief.mu = 0.0;
+  object.moment = {};
   add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
   object.reported_box = object.box;
   object.gained = object.lost = 0;
   step.owner_of_observation[match.observation] = to_index(object.id);
+  return true;
+}
+
+Moment& ObjectTracker::moment_of(Step& step, LibraryObject& object) {
+  const std::string& robot = step.frame.robot;
+  const StampNs stamp_ns = step.frame.stamp_ns;
+  Moment& moment = object.moment;
+  if (!moment.robots.empty() && moment.robots.back() == robot && moment.frame_ns == stamp_ns) {
+    return moment;
+  }
+  const auto length_ns = static_cast<StampNs>(config_.state.moment_s * 1e9);
+  const bool same =
+      !moment.robots.empty() && stamp_ns >= moment.start_ns &&
+      stamp_ns - moment.start_ns <= length_ns &&
+      std::find(moment.robots.begin(), moment.robots.end(), robot) == moment.robots.end();
+  if (!same) {
+    moment = {};
+    moment.start_ns = stamp_ns;
+    moment.before = object.belief;
+  }
+  moment.frame_ns = stamp_ns;
+  moment.robots.push_back(robot);
+  return moment;
+}
+
+bool ObjectTracker::measure(Step& step, LibraryObject& object, double delta_m,
+                            const Sighting& sighting) {
+  Moment& moment = moment_of(step, object);
+  const int points = sighting.visible();
+  if (moment.robots.size() > 1 && moment.measured) {
+    // What the object does between two moments is asked once: two cameras that look at the same
+    // time do not make it twice as certain that it stays.
+    if (points <= moment.points) return false;
+    object.belief = moment.before;
+  }
+  moment.measured = true;
+  moment.points = points;
+  step.evidence[object.id] =
+      apply_measurement(object, delta_m, sighting, config_.state, config_.change);
   return true;
 }
 
@@ -193,11 +236,11 @@ void ObjectTracker::update_unmatched(Step& step) {
     const bool aware = config_.association.occlusion_aware;
     const double share = aware ? sighting.visible_share() : sighting.in_view_share();
     if (share < config_.association.min_visible_share) continue;
-    if (!object.confirmed) ++object.frames_in_view;
+    Moment& moment = moment_of(step, object);
+    if (!object.confirmed && moment.robots.size() == 1) ++object.frames_in_view;
     if (aware && !step.association.doubtful[c]) continue;
-    ++object.frames_seen_through;
-    step.evidence[object.id] = apply_measurement(object, config_.change.delta_max_m, sighting,
-                                                 config_.state, config_.change);
+    if (!measure(step, object, config_.change.delta_max_m, sighting)) continue;
+    if (!std::exchange(moment.seen_through, true)) ++object.frames_seen_through;
     mark_changed(object);
   }
 }
@@ -229,9 +272,12 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) 
   object.growing = added > kGrowingShare * static_cast<double>(object.model.surfels().size());
   object.cut = observation.cut_share > kCutShare;
   object.icp_target.reset();
-  ++object.observations;
+  Moment& moment = moment_of(step, object);
+  if (moment.robots.size() == 1 || !moment.observed) ++object.observations;
+  moment.observed = true;
   object.last_seen_ns = step.frame.stamp_ns;
   object.last_robot = step.frame.robot;
+  if (!step.frame.robot.empty()) object.seen_by.insert(step.frame.robot);
   mark_changed(object);
   const std::size_t surfels = object.model.surfels().size();
   object.most_surfels = std::max(object.most_surfels, surfels);
@@ -288,6 +334,10 @@ void ObjectTracker::add_new(Step& step) {
     const auto origin = step.moved_from.find(index);
     if (origin != step.moved_from.end()) object.moved_from = origin->second;
     fuse(step, object, index);
+    // The first look says what is there; another one in the same moment, nothing of whether it
+    // stays.
+    object.moment.measured = true;
+    object.moment.points = std::numeric_limits<int>::max();
     object.frames_in_view = 1;
     step.owner_of_observation[index] = to_index(object.id);
   }

@@ -42,6 +42,11 @@ class ObjectTracker {
   void remove_or_confirm(Step& step);
   void report_changes(Step& step);
 
+  /// The moment of the object that this frame belongs to, entered on the first call.
+  Moment& moment_of(Step& step, LibraryObject& object);
+  /// Puts the frame's measurement into the belief and into the step's evidence; false when another
+  /// robot has told more of the object in this moment.
+  bool measure(Step& step, LibraryObject& object, double delta_m, const Sighting& sighting);
   /// An object that was moved or turned a little, too little to be seen through: true when it is
   /// found displaced (and moved, once that has lasted), so that the observation must not be fused
   /// as it is.
@@ -50,7 +55,8 @@ class ObjectTracker {
   void fuse(Step& step, LibraryObject& object, std::int32_t observation);
   void refit_box(Step& step, LibraryObject& object);
   /// Makes a new object the continuation of a known one: id, voxels, history.
-  void take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns);
+  void take_identity(Step& step, LibraryObject& object, ObjectId id, StampNs first_seen_ns,
+                     const std::set<std::string>& seen_by);
   /// Where a new object may have come from: the nearest place of a like object that was removed, or
   /// that was not seen in its place since the new one turned up.
   struct Origin {

@@ -45,26 +45,22 @@ void RecordedRobot::add_camera_info(StampNs stamp_ns, const CameraModel& camera)
   if (!synchronizer_.add_camera_info(stamp_ns, camera)) refuse_backwards(stamp_ns);
 }
 
-void RecordedRobot::add_odometry(const RosTransform& transform) {
-  odometry_children_.insert(transform.child_frame_id);
-  if (!transforms_.add(transform.header.frame_id, transform.child_frame_id,
-                       transform.header.stamp_ns, transform.T)) {
-    refuse_backwards(transform.header.stamp_ns);
-  }
-  synchronizer_.pose_seen(transform.header.stamp_ns);
+void RecordedRobot::add_odometry(const StampedTransform& transform) {
+  odometry_children_.insert(transform.child);
+  const auto problem =
+      transforms_.add(transform.parent, transform.child, transform.stamp_ns, transform.T);
+  if (problem) throw InputError(problem->detail);
+  synchronizer_.pose_seen(transform.stamp_ns);
 }
 
-void RecordedRobot::add_transform(const RosTransform& transform, bool is_static) {
-  if (is_static) {
-    transforms_.set_static(transform.header.frame_id, transform.child_frame_id, transform.T);
-    return;
-  }
+void RecordedRobot::add_transform(const StampedTransform& transform, bool is_static) {
   // Odometry says the same on a topic of its own; two sources of one transform would interleave.
-  if (odometry_children_.count(transform.child_frame_id) > 0) return;
-  if (!transforms_.add(transform.header.frame_id, transform.child_frame_id,
-                       transform.header.stamp_ns, transform.T)) {
-    refuse_backwards(transform.header.stamp_ns);
-  }
+  if (!is_static && odometry_children_.count(transform.child) > 0) return;
+  const auto problem =
+      is_static
+          ? transforms_.set_static(transform.parent, transform.child, transform.T)
+          : transforms_.add(transform.parent, transform.child, transform.stamp_ns, transform.T);
+  if (problem) throw InputError(problem->detail);
 }
 
 std::vector<Frame> RecordedRobot::take(bool last_call, std::vector<std::string>& problems) {

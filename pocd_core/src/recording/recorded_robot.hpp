@@ -3,7 +3,6 @@
 
 #include <set>
 
-#include "frame_inputs.hpp"
 #include "pocd/datasets/recording_options.hpp"
 #include "pocd/input/frame.hpp"
 #include "pocd/input/time_synchronizer.hpp"
@@ -27,8 +26,8 @@ class RecordedRobot {
   void add_image(TimeSynchronizer::Stream stream, StampNs stamp_ns, const std::string& frame_id,
                  cv::Mat image);
   void add_camera_info(StampNs stamp_ns, const CameraModel& camera);
-  void add_odometry(const RosTransform& transform);
-  void add_transform(const RosTransform& transform, bool is_static);
+  void add_odometry(const StampedTransform& transform);
+  void add_transform(const StampedTransform& transform, bool is_static);
 
   /// Frames that are ready, by stamp; a frame whose images disagree adds to `problems`.
   std::vector<Frame> take(bool last_call, std::vector<std::string>& problems);

@@ -8,7 +8,10 @@
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
 #include "pocd/input/frame_merger.hpp"
+#include "pocd/input/message_checks.hpp"
+#include "pocd/input/robot_topic.hpp"
 #include "pocd/recording/recording_reader.hpp"
+#include "pocd/recording/ros_messages.hpp"
 #include "recorded_robot.hpp"
 
 namespace pocd {
@@ -22,21 +25,21 @@ constexpr std::size_t kMostBehind = 64;
 // Between two runs: longer than poses are interpolated over.
 constexpr StampNs kPause = 1'000'000'000;
 
-/// The name that stands for {robot} in `pattern`, "" when there is none in it; nothing when the
-/// topic does not fit.
-std::optional<std::string> robot_in(const std::string& pattern, const std::string& topic) {
-  constexpr char kKey[] = "{robot}";
-  const std::size_t at = pattern.find(kKey);
-  if (at == std::string::npos) {
-    return topic == pattern ? std::optional<std::string>("") : std::nullopt;
-  }
-  const std::string tail = pattern.substr(at + sizeof kKey - 1);
-  if (topic.size() <= at + tail.size() || topic.compare(0, at, pattern, 0, at) != 0 ||
-      topic.compare(topic.size() - tail.size(), tail.size(), tail) != 0) {
-    return std::nullopt;
-  }
-  std::string name = topic.substr(at, topic.size() - at - tail.size());
-  return name.find('/') == std::string::npos ? std::optional(std::move(name)) : std::nullopt;
+/// Throws what is wrong.
+template <class T>
+T good(Checked<T> checked) {
+  if (checked.problem) throw InputError(checked.problem->detail);
+  return std::move(*checked.value);
+}
+
+ImageView view_of(const RosImage& image) {
+  return {image.width, image.height, image.encoding, image.is_bigendian != 0,
+          image.step,  image.data,   image.size};
+}
+
+StampedTransform transform_of(const RosTransform& transform) {
+  return good(checked_transform({transform.header.frame_id, transform.child_frame_id,
+                                 transform.header.stamp_ns, transform.T}));
 }
 
 enum class Use { kNone, kImage, kCameraInfo, kOdometry, kTf, kTfStatic };
@@ -52,7 +55,7 @@ class RecordingDataset : public DatasetReader {
  public:
   explicit RecordingDataset(const DatasetOptions& options)
       : options_(options.recording),
-        colours_(colour_values(options.classes)),
+        colours_(options.classes),
         with_color_(options.with_color),
         merger_(std::nullopt) {
     for (const auto& input : options.inputs) {
@@ -192,9 +195,10 @@ class RecordingDataset : public DatasetReader {
         return;
       case Use::kImage: {
         const RosImage image = decode_image(message.data, message.size);
-        cv::Mat pixels = to.stream == Stream::kDepth   ? depth_image(image)
-                         : to.stream == Stream::kColor ? color_image(image)
-                                                       : label_image(image, colours_);
+        cv::Mat pixels = to.stream == Stream::kDepth ? good(depth_image(view_of(image)))
+                         : to.stream == Stream::kColor
+                             ? good(color_image(view_of(image)))
+                             : good(label_image(view_of(image), colours_)).labels;
         const StampNs stamp_ns = image.header.stamp_ns + shift_ns_;
         if (to.stream == Stream::kDepth) last_ns_ = std::max(last_ns_.value_or(stamp_ns), stamp_ns);
         robot->second->add_image(to.stream, stamp_ns, image.header.frame_id, std::move(pixels));
@@ -202,7 +206,8 @@ class RecordingDataset : public DatasetReader {
       }
       case Use::kCameraInfo: {
         const RosCameraInfo info = decode_camera_info(message.data, message.size);
-        robot->second->add_camera_info(info.header.stamp_ns + shift_ns_, camera_model(info));
+        robot->second->add_camera_info(info.header.stamp_ns + shift_ns_,
+                                       good(camera_model(info.width, info.height, info.k)));
         return;
       }
       case Use::kOdometry:
@@ -211,15 +216,15 @@ class RecordingDataset : public DatasetReader {
       case Use::kTf:
       case Use::kTfStatic:
         for (const RosTransform& transform : decode_tf(message.data, message.size)) {
-          const RosTransform checked = shifted(transform);
+          const StampedTransform checked = shifted(transform);
           for (auto& [name, any] : robots_) any->add_transform(checked, to.use == Use::kTfStatic);
         }
     }
   }
 
-  RosTransform shifted(RosTransform transform) const {
-    transform = checked_transform(std::move(transform));
-    transform.header.stamp_ns += shift_ns_;
+  StampedTransform shifted(const RosTransform& message) const {
+    StampedTransform transform = transform_of(message);
+    transform.stamp_ns += shift_ns_;
     return transform;
   }
 
@@ -281,7 +286,7 @@ class RecordingDataset : public DatasetReader {
   }
 
   RecordingOptions options_;
-  ColourValues colours_;
+  ColourTable colours_;
   bool with_color_;
   std::vector<std::filesystem::path> files_;
   std::map<std::string, std::unique_ptr<RecordedRobot>> robots_;

@@ -86,10 +86,11 @@ TEST(TransformTree, ALoopIsNoChain) {
   TransformTree tree(1000);
   tree.set_static("a", "b", {});
   tree.set_static("b", "a", {});
-  EXPECT_EQ(tree.lookup("map", "a", 0, 0).result, PoseLookup::kEmpty);
+  EXPECT_EQ(tree.lookup("map", "a", 0, 0).result, PoseLookup::kLoop);
 }
 
-// The pose that a node computes from messages is the one that an offline run computes, in every bit.
+// The pose that a node computes from messages is the one that an offline run computes, in every
+// bit.
 TEST(TransformTree, EqualsThroughMessagesBitByBit) {
   Random random(3);
   for (int i = 0; i < 1000; ++i) {
@@ -144,6 +145,32 @@ TEST(FrameMerger, GoesOnWithoutARobotThatHasGoneOrLags) {
   EXPECT_FALSE(merger.take());
   merger.set_live("b", false);
   EXPECT_EQ(merger.take(), 2);
+}
+
+// A dead robot is not waited for, leaves nothing behind, and may come back with any clock.
+TEST(FrameMerger, ForgetsARobotAndItsClock) {
+  FrameMerger<int> merger(1000);
+  merger.set_live("a", true);
+  merger.set_live("b", true);
+  merger.add("a", 5000000, 1);
+  merger.set_watermark("a", 5000000);
+  EXPECT_FALSE(merger.take());
+  merger.forget("b");
+  EXPECT_FALSE(merger.knows("b"));
+  merger.forget("a");
+  EXPECT_TRUE(merger.knows("a")) << "a frame is left";
+  EXPECT_EQ(merger.take(), 1);
+  EXPECT_FALSE(merger.knows("a"));
+  // Had the old clock stayed, b would count as far behind from now on.
+  merger.set_live("a", true);
+  merger.set_live("b", true);
+  merger.add("a", 10, 2);
+  merger.set_watermark("a", 10);
+  EXPECT_FALSE(merger.take());
+  EXPECT_EQ(merger.waits_for(), "b");
+  merger.add("b", 5, 3);
+  merger.set_watermark("b", 5);
+  EXPECT_EQ(merger.take(), 3);
 }
 
 }  // namespace

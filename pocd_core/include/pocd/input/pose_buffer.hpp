@@ -10,8 +10,9 @@
 namespace pocd {
 
 /// kTooNew: the stamp lies after the newest pose; a later one may still arrive. kTooOld: before the
-/// oldest one kept. kGap: between two poses that are further apart than `max_gap_ns`.
-enum class PoseLookup { kFound, kTooNew, kTooOld, kGap, kEmpty };
+/// oldest one kept. kGap: between two poses that are further apart than `max_gap_ns`. kLoop: of
+/// TransformTree only.
+enum class PoseLookup { kFound, kTooNew, kTooOld, kGap, kEmpty, kLoop };
 const char* to_string(PoseLookup result);
 
 /// Not thread-safe.

@@ -9,6 +9,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pocd/common/types.hpp"
@@ -17,8 +18,8 @@
 
 namespace pocd {
 
-/// kAbsent: not looked at. kOptional: waited for, then gone on without. kRequired: waited for, then the
-/// frame is dropped.
+/// kAbsent: not looked at. kOptional: waited for, then gone on without. kRequired: waited for, then
+/// the frame is dropped.
 enum class StreamUse { kAbsent, kOptional, kRequired };
 
 struct SynchronizerConfig {
@@ -60,14 +61,14 @@ struct SynchronizerCounts {
 };
 
 /// Streams of one robot. Time is data time only: nothing here reads a clock. Frames come out in the
-/// order of their stamps; the oldest one holds up the others until it is complete or its wait is over.
-/// Not thread-safe.
+/// order of their stamps; the oldest one holds up the others until it is complete or its wait is
+/// over. Not thread-safe.
 class TimeSynchronizer {
  public:
   /// `transforms` must outlive the synchroniser; it gives T_map_camera.
   TimeSynchronizer(const SynchronizerConfig& config, const TransformTree& transforms);
 
-  enum class Stream { kDepth, kSegmentation, kColor, kCameraInfo };
+  enum class Stream { kDepth, kSegmentation, kColor, kCameraInfo, kPose };
 
   /// False, and nothing stored, when the stamp is not after the stream's newest one.
   bool add_image(Stream stream, StampNs stamp_ns, cv::Mat image);
@@ -78,6 +79,9 @@ class TimeSynchronizer {
   /// Unbounded wait for replay without loss: what a frame lacks is waited for, however far other
   /// streams run ahead.
   void set_patient(bool patient) { patient_ = patient; }
+
+  /// A stream of images that is missing at once wherever it is not there; nothing: none.
+  void set_missing(std::optional<Stream> stream) { missing_ = stream; }
 
   /// Frame of the depth camera in the transforms, when only the first image tells.
   void set_camera_frame(const std::string& frame) { config_.camera_frame = frame; }
@@ -93,6 +97,12 @@ class TimeSynchronizer {
   std::size_t pending() const { return depth_.size(); }
   /// No frame with this stamp or an earlier one will come out any more.
   StampNs watermark_ns() const { return watermark_ns_; }
+  /// The stream that the oldest frame waits for; nothing when there is none or it waits for none.
+  std::optional<Stream> blocked_by() const { return blocked_by_; }
+  /// Why a frame that was waited for was dropped without pose, the last time since the call before.
+  std::optional<InputProblem> take_pose_problem() {
+    return std::exchange(pose_problem_, std::nullopt);
+  }
   /// "" or "waiting for <stream> since <stamp>" about the oldest frame that is not complete.
   std::string waiting_for() const;
   const SynchronizerCounts& counts() const { return counts_; }
@@ -110,7 +120,10 @@ class TimeSynchronizer {
   StampNs horizon_ns_ = std::numeric_limits<StampNs>::min();
   StampNs watermark_ns_ = std::numeric_limits<StampNs>::min();
   bool patient_ = false;
-  std::string blocked_by_;
+  std::optional<Stream> missing_;
+  std::optional<Stream> blocked_by_;
+  std::string blocking_edge_;  // of the pose
+  std::optional<InputProblem> pose_problem_;
   SynchronizerCounts counts_;
 };
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -14,6 +15,18 @@
 #include "pocd/pipeline/frame_result.hpp"
 
 namespace pocd {
+
+/// The views of an object that count as one: of different robots, within a short time.
+struct Moment {
+  StampNs start_ns = 0;
+  StampNs frame_ns = 0;             ///< of the last view
+  std::vector<std::string> robots;  ///< that have looked, in that order
+  Belief before;                    ///< before any of the views
+  bool measured = false;            ///< a view has gone into the belief
+  bool observed = false;            ///< a view has been counted as observation
+  bool seen_through = false;        ///< a view has been counted as seen through
+  int points = 0;                   ///< of the object, that the view in the belief told of
+};
 
 struct LibraryObject {
   LibraryObject(ObjectId object_id, double spacing_m) : id(object_id), model(spacing_m) {}
@@ -33,6 +46,8 @@ struct LibraryObject {
   StampNs contested_since_ns = 0;  ///< the first such frame after it was verified
   std::optional<bool> arrived;     ///< whether its place was seen empty before; when asked
   std::string last_robot;
+  std::set<std::string> seen_by;  ///< robots that have observed it
+  Moment moment;                  ///< the last one
   std::uint32_t observations = 0;
   int frames_in_view = 0;           ///< tentative only
   int frames_seen_through = 0;      ///< in a row

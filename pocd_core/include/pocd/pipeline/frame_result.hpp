@@ -26,7 +26,8 @@ struct ObjectSnapshot {
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;
   std::uint32_t observations = 0;
-  std::string last_robot;  ///< namespace of the robot that saw it last
+  std::string last_robot;            ///< namespace of the robot that saw it last
+  std::vector<std::string> seen_by;  ///< all robots that have seen it, by name
 };
 
 enum class EventKind { kAdded, kUpdated, kMoved, kRemoved };

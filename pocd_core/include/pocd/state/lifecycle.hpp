@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "pocd/association/visibility.hpp"
@@ -63,6 +64,7 @@ class RelocationMemory {
     StampNs verified_ns;
     StampNs contested_since_ns;
     StampNs removed_ns;
+    std::set<std::string> seen_by = {};
   };
   void remember(const Removed& removed) { removed_.push_back(removed); }
 

@@ -19,6 +19,7 @@ struct StateConfig {
   int erode_frames = 5;
   int wait_for_doubt_frames = 6;
   int merge_frames = 10;
+  double moment_s = 0.1;
   double relocation_window_s = 60.0;
   double relocation_reach_m = 2.5;
   double least_depth_m = 0.4;
@@ -56,6 +57,10 @@ struct StateConfig {
           "one MOVED then [frames].");
     visit("merge_frames", merge_frames, Range{1, 100000},
           "Objects of one class that share an observation in this many frames are one [frames].");
+    visit(
+        "moment_s", moment_s, Range{0.0, 10.0},
+        "Looks of several robots at one object within this time are one measurement: the one that "
+        "saw most of the object counts [s].");
     visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
           "A removed object and a new one of like class and size within this time are one MOVED "
           "[s].");

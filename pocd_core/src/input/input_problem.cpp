@@ -1,0 +1,53 @@
+#include "pocd/input/input_problem.hpp"
+
+namespace pocd {
+
+const char* to_string(InputReason reason) {
+  switch (reason) {
+    case InputReason::kEmptyImage:
+      return "empty_image";
+    case InputReason::kUnknownEncoding:
+      return "unknown_encoding";
+    case InputReason::kBigEndian:
+      return "big_endian";
+    case InputReason::kStepTooSmall:
+      return "step_too_small";
+    case InputReason::kDataSize:
+      return "data_size";
+    case InputReason::kTooLarge:
+      return "too_large";
+    case InputReason::kUnknownColour:
+      return "unknown_colour";
+    case InputReason::kBadImageSize:
+      return "bad_image_size";
+    case InputReason::kZeroFocalLength:
+      return "zero_focal_length";
+    case InputReason::kNotFinite:
+      return "not_finite";
+    case InputReason::kNonUnitQuaternion:
+      return "non_unit_quaternion";
+    case InputReason::kEmptyFrameName:
+      return "empty_frame_name";
+    case InputReason::kStampBackwards:
+      return "stamp_backwards";
+    case InputReason::kSizesDisagree:
+      return "sizes_disagree";
+    case InputReason::kWrongType:
+      return "wrong_type";
+    case InputReason::kFrameChanged:
+      return "frame_changed";
+    case InputReason::kParentChanged:
+      return "parent_changed";
+    case InputReason::kNoTransform:
+      return "no_transform";
+    case InputReason::kTransformLoop:
+      return "transform_loop";
+    case InputReason::kNoPose:
+      return "no_pose";
+    case InputReason::kSilentStream:
+      return "silent_stream";
+  }
+  return "";
+}
+
+}  // namespace pocd

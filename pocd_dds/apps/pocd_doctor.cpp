@@ -1,0 +1,145 @@
+// What is wrong with this configuration, this machine, this bus.
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <sstream>
+#include <thread>
+
+#include "apps/common.hpp"
+#include "pocd/config/config_io.hpp"
+#include "pocd_dds/doctor/bus_checks.hpp"
+#include "pocd_dds/doctor/machine_checks.hpp"
+
+namespace {
+
+using namespace pocd::dds;  // NOLINT: this file is about nothing else
+
+struct DoctorOptions {
+  BusOptions bus;
+  std::vector<std::filesystem::path> files;
+  std::vector<std::string> overrides, robots;
+  double listen_s = 5.0;
+  std::string proc = "/proc", shared_memory = "/dev/shm";
+};
+
+void add(Findings& to, const Findings& more) { to.insert(to.end(), more.begin(), more.end()); }
+
+/// Loads what can be loaded; every error is a finding.
+Findings check_configuration(const DoctorOptions& options, NodeFile& config) {
+  Findings findings;
+  try {
+    pocd::load_config(config, options.files, options.overrides);
+  } catch (const pocd::InputError& error) {
+    std::istringstream lines(error.what());
+    for (std::string line; std::getline(lines, line);) {
+      if (!line.empty()) {
+        findings.push_back({Severity::kError, "configuration", line,
+                            "docs/parameters.md and docs/node_parameters.md list what there is"});
+      }
+    }
+    config = NodeFile{};
+  }
+  for (const std::string& name : options.robots) {
+    RobotConfig robot;
+    robot.name = name;
+    config.node.robots.push_back(robot);
+  }
+  return findings;
+}
+
+/// Listens as a node would, beside a participant that looks at who and what is there.
+Findings check_bus(const DoctorOptions& options, NodeFile config) {
+  Findings findings;
+  BusWatch watch, intake_watch;
+  BusOptions bus = options.bus;
+  bus.listener = &watch;
+  const Participant observer(bus);
+  bus.listener = &intake_watch;
+  const auto listener = std::make_shared<Participant>(bus);
+  const NodeConfig expected = config.node;
+  config.node.lossless = false;  // that would hold senders back
+  FrameQueue frames(1);
+  Intake intake(listener, config.node, config.pipeline.classes, intake_watch, frames);
+  const auto end = std::chrono::steady_clock::now() +
+                   std::chrono::milliseconds(static_cast<long>(1e3 * options.listen_s));
+  while (!stop_requested && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  BusPicture picture;
+  for (const BusEvent& event : watch.take()) picture.hear(event);
+  std::string names;
+  for (const auto& [key, name] : picture.participants()) {
+    if (name != bus.name) names += (names.empty() ? "" : ", ") + name;
+  }
+  const std::string domain = "domain " + std::to_string(bus.domain);
+  if (names.empty()) {
+    findings.push_back({Severity::kError, domain, "nobody else is there",
+                        "check --domain and ROS_DOMAIN_ID on both sides, and that multicast works; "
+                        "containers need one /dev/shm (--ipc host)"});
+  } else {
+    findings.push_back({Severity::kNote, domain, "participants: " + names, ""});
+  }
+  add(findings, check_topics(picture, expected));
+  add(findings, check_intake(intake.status()));
+  return findings;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Says what is wrong with this configuration, this machine and this bus, one line each, and "
+      "what to do.\n"
+      "Example: pocd_doctor --config config/torwic.yaml --robot robot1 --domain 7\n"
+      "Exit code: 0 nothing wrong (notes at most), 1 something is, 2 usage.",
+      "pocd_doctor");
+  DoctorOptions options;
+  options.bus.name = "pocd_doctor";
+  app.set_version_flag("--version", POCD_VERSION);
+  app.add_option("--config", options.files, "Configuration file of the node; repeat it to overlay")
+      ->allow_extra_args(false);
+  app.add_option("--set", options.overrides, "Override one parameter: GROUP.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--robot", options.robots, "A robot that should be there; repeat it for several")
+      ->allow_extra_args(false);
+  app.add_option("--listen", options.listen_s, "How long to listen to the bus [s]")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  app.add_option("--proc", options.proc, "Where the machine's /proc is")->capture_default_str();
+  app.add_option("--shm", options.shared_memory, "Where shared memory is")->capture_default_str();
+  int domain = -1;
+  add_bus_options(app, domain, options.bus.profiles_file);
+  try {
+    app.parse(argc, argv);
+    options.bus.domain = domain >= 0 ? domain : default_domain();
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const pocd::InputError& error) {
+    std::cerr << "pocd_doctor: " << error.what() << '\n';
+    return 2;
+  }
+  return guarded("pocd_doctor", [&] {
+    log_to_stderr("pocd_doctor");
+    spdlog::set_level(spdlog::level::off);  // everything is a finding
+    stop_on_signals();
+    NodeFile config;
+    Findings findings = check_configuration(options, config);
+    add(findings, check_network_settings(options.proc));
+    add(findings, check_shared_memory(options.shared_memory));
+    add(findings, check_environment(std::filesystem::current_path()));
+    try {
+      add(findings, check_bus(options, config));
+    } catch (const pocd::InputError& error) {
+      findings.push_back({Severity::kError, "bus", error.what(), "see docs/topics_and_qos.md"});
+    }
+    std::stable_sort(findings.begin(), findings.end(),
+                     [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+    bool good = true;
+    for (const Finding& finding : findings) {
+      std::cout << line_of(finding) << '\n';
+      good = good && finding.severity == Severity::kNote;
+    }
+    if (good) std::cout << "nothing wrong was found\n";
+    return std::cout.flush() && good ? 0 : 1;
+  });
+}

@@ -1,0 +1,35 @@
+// What is on the bus against what the configuration expects.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "pocd_dds/doctor/finding.hpp"
+#include "pocd_dds/entities/bus_watch.hpp"
+#include "pocd_dds/node/intake.hpp"
+#include "pocd_dds/node/node_config.hpp"
+
+namespace pocd::dds {
+
+/// All that discovery has told so far.
+class BusPicture {
+ public:
+  void hear(const BusEvent& event);
+
+  const std::map<ParticipantKey, std::string>& participants() const { return participants_; }
+  /// Writers or readers of a topic.
+  std::vector<BusEndpoint> endpoints(const std::string& topic, bool writers) const;
+  const std::map<EndpointKey, BusEndpoint>& all() const { return endpoints_; }
+
+ private:
+  std::map<ParticipantKey, std::string> participants_;
+  std::map<EndpointKey, BusEndpoint> endpoints_;
+};
+
+/// Topics, types and quality of service of every robot that is named or was found.
+Findings check_topics(const BusPicture& bus, const NodeConfig& node);
+
+/// What an intake made of what it heard: bad messages, missing transforms, silent streams.
+Findings check_intake(const IntakeStatus& intake);
+
+}  // namespace pocd::dds

@@ -1,0 +1,42 @@
+#include "pocd_dds/node/transform_input.hpp"
+
+#include "pocd_dds/bridge/conversions.hpp"
+
+namespace pocd::dds {
+
+TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
+                               const std::string& tf_topic, const std::string& tf_static_topic,
+                               Wakeup& wakeup)
+    : moving_(participant, topics::kTf, tf_topic, topics::kTf.delivery, wakeup),
+      static_(participant, topics::kTfStatic, tf_static_topic, topics::kTfStatic.delivery, wakeup) {
+}
+
+bool TransformInput::drain(TransformTree& tree, ProblemCounter& problems) {
+  drain(static_, true, tree, problems);
+  return drain(moving_, false, tree, problems);
+}
+
+bool TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree,
+                           ProblemCounter& problems) {
+  tf2_msgs::msg::TFMessage message;
+  SampleMeta meta;
+  bool any = false;
+  while (reader.take(message, meta)) {
+    if (!meta.valid) continue;
+    for (const auto& entry : message.transforms()) {
+      const Checked<StampedTransform> transform = transform_from(entry);
+      if (!transform.value) {
+        problems.count(reader.topic(), *transform.problem);
+        continue;
+      }
+      any = true;
+      const auto& [parent, child, stamp_ns, T] = *transform.value;
+      const std::optional<InputProblem> problem =
+          is_static ? tree.set_static(parent, child, T) : tree.add(parent, child, stamp_ns, T);
+      if (problem) problems.count(reader.topic(), *problem);
+    }
+  }
+  return any;
+}
+
+}  // namespace pocd::dds

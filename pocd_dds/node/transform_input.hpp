@@ -1,0 +1,32 @@
+// Transforms of one tf or tf_static topic, into a tree.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pocd/input/transform_tree.hpp"
+#include "pocd_dds/bridge/input_problem.hpp"
+#include "pocd_dds/entities/reader.hpp"
+#include "tf2_msgsPubSubTypes.h"
+
+namespace pocd::dds {
+
+/// Both kinds. Used by one thread only.
+class TransformInput {
+ public:
+  /// `wakeup` must outlive it.
+  TransformInput(const std::shared_ptr<Participant>& participant, const std::string& tf_topic,
+                 const std::string& tf_static_topic, Wakeup& wakeup);
+
+  /// Puts what has arrived into the tree. True when there was anything that moves.
+  bool drain(TransformTree& tree, ProblemCounter& problems);
+
+ private:
+  using TfReader = Reader<tf2_msgs::msg::TFMessagePubSubType>;
+  static bool drain(TfReader& reader, bool is_static, TransformTree& tree,
+                    ProblemCounter& problems);
+
+  TfReader moving_, static_;
+};
+
+}  // namespace pocd::dds

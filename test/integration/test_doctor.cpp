@@ -1,0 +1,115 @@
+// pocd_doctor: one line for everything that is wrong, and nothing when nothing is.
+#include <gtest/gtest.h>
+#include <sys/file.h>
+
+#include "robot_sender.hpp"
+
+namespace pocd {
+namespace {
+
+constexpr StampNs kMs = 1'000'000;
+
+void write_file(const std::filesystem::path& file, const std::string& text) {
+  std::filesystem::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+}
+
+/// A machine to the doctor's liking.
+struct Machine {
+  explicit Machine(const std::string& socket_bytes = "8388608") {
+    for (const char* name : {"rmem_max", "wmem_max"}) {
+      write_file(folder.path() / "proc/sys/net/core" / name, socket_bytes + "\n");
+    }
+    std::filesystem::create_directories(folder.path() / "shm");
+  }
+  std::filesystem::path shm() const { return folder.path() / "shm"; }
+  std::vector<std::string> command(const TestDomain& domain,
+                                   const std::vector<std::string>& more) const {
+    std::vector<std::string> list{bin("pocd_doctor"),
+                                  "--domain",
+                                  domain.text(),
+                                  "--proc",
+                                  (folder.path() / "proc").string(),
+                                  "--shm",
+                                  shm().string()};
+    list.insert(list.end(), more.begin(), more.end());
+    return list;
+  }
+  TemporaryFolder folder;
+};
+
+/// Sends frames to the doctor, once it listens, and then asks it for what it has found.
+CommandResult ask(Process& doctor, RobotSender& robot, const std::function<void(StampNs)>& send) {
+  EXPECT_TRUE(eventually([&] { return robot.matched(); }));
+  for (int i = 1; i <= 40; ++i) {
+    send(i * 200 * kMs);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  doctor.signal(SIGINT);
+  return doctor.wait();
+}
+
+TEST(Doctor, FindsNothingWhereNothingIsWrong) {
+  const TestDomain domain;
+  const Machine machine;
+  const auto bus = test_participant(domain);
+  RobotSender robot(bus, "robot1");
+  Process doctor(machine.command(domain, {"--listen", "120", "--set", "node.segmentation=absent"}));
+  const CommandResult result = ask(doctor, robot, [&](StampNs t) { robot.send_frame(t); });
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_NE(result.out.find("nothing wrong was found"), std::string::npos) << result.out;
+}
+
+TEST(Doctor, NamesWhatIsWrongOnTheBus) {
+  const TestDomain domain;
+  const Machine machine;
+  const auto bus = test_participant(domain);
+  RobotSender robot(bus, "robot1");
+  dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> wrong(
+      bus, dds::topics::kCameraInfo, "rt/robot2/depth/image_raw", kTestDelivery);
+  dds::TopicSpec statics = dds::topics::kTfStatic;
+  dds::Writer<tf2_msgs::msg::TFMessagePubSubType> volatile_tf(bus, statics, statics.name,
+                                                              kTestDelivery);
+  Process doctor(
+      machine.command(domain, {"--listen", "120", "--robot", "robot1", "--robot", "robot2",
+                               "--robot", "robot3", "--set", "node.segmentation=required"}));
+  const CommandResult result = ask(doctor, robot, [&](StampNs t) {
+    robot.send_odometry({"map", "base", t, {}});
+    robot.send_image(t);
+  });
+  EXPECT_EQ(result.exit_code, 1);
+  for (const char* line :
+       {"error: rt/robot1/segmentation: nobody announces it",
+        "error: rt/robot1/depth/image_raw: no_transform", "nobody says where \"robot1_camera\" is",
+        "error: rt/robot2/depth/image_raw: has type sensor_msgs::msg::dds_::CameraInfo_",
+        "error: rt/robot3/depth/image_raw: nobody announces it",
+        "error: rt/robot3/odom: nobody announces it, nor rt/tf",
+        "error: rt/tf_static: is offered volatile"}) {
+    EXPECT_NE(result.out.find(line), std::string::npos) << line << "\n" << result.out;
+  }
+}
+
+TEST(Doctor, NamesWhatIsWrongWithConfigurationAndMachine) {
+  const TestDomain domain;
+  const Machine machine("212992");
+  for (const char* name : {"fastrtps_dead", "fastrtps_dead_el", "fastrtps_live", "fastrtps_live_el",
+                           "fastrtps_port7411", "fastrtps_port7411_el"}) {
+    write_file(machine.shm() / name, "x");
+  }
+  const int held = open((machine.shm() / "fastrtps_live_el").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(flock(held, LOCK_EX), 0);
+  const CommandResult result =
+      run_command(machine.command(domain, {"--listen", "0.1", "--set", "node.queue_framez=3"}));
+  close(held);
+  EXPECT_EQ(result.exit_code, 1);
+  for (const char* line :
+       {"error: configuration: ", "queue_frames", "warning: net.core.rmem_max: 212992 bytes",
+        "sysctl -w net.core.wmem_max=4194304", "1 segments (0 MiB)", "nobody else is there",
+        "no robot announces depth images"}) {
+    EXPECT_NE(result.out.find(line), std::string::npos) << line << "\n" << result.out;
+  }
+  EXPECT_EQ(run_command({bin("pocd_doctor"), "--nonsense"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace pocd

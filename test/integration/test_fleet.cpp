@@ -1,0 +1,190 @@
+// Robots come and go while the node runs.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "robot_sender.hpp"
+
+namespace pocd {
+namespace {
+
+constexpr StampNs kMs = 1'000'000;
+
+std::size_t count_of(const std::string& text, const std::string& what) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; ++at) ++count;
+  return count;
+}
+
+std::vector<std::string> play_live(const TestDomain& domain) {
+  return {bin("pocd_play"), "--dataset", "sim", "--input", scenario(), "--domain", domain.text()};
+}
+
+TEST(Fleet, ARobotAppearsDiesIsNamedAndForgottenAndComesBack) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  FrameWatch frames(bus);
+  RobotSender other(bus, "other");
+  Process node(fleet_command(domain, {"--set", "node.segmentation=absent"}));
+  ASSERT_TRUE(eventually([&] { return health.newest() != nullptr && frames.matched(); }));
+  const auto present = [&] {
+    std::set<std::string> names;
+    for (const auto& robot : health.newest()->robots()) names.insert(robot.name());
+    return names;
+  };
+  const auto departures = [&] { return health.newest()->departures(); };
+  ASSERT_TRUE(eventually([&] { return other.matched(); })) << "was there before the node";
+
+  {
+    Process robot(play_live(domain));
+    ASSERT_TRUE(eventually([&] { return frames.processed("robot1") > 2; })) << node.err();
+    EXPECT_TRUE(eventually([&] { return present() == std::set<std::string>{"other", "robot1"}; }));
+    robot.signal(SIGKILL);
+    robot.wait();
+  }
+  ASSERT_TRUE(eventually([&] { return departures().size() == 1; })) << node.err();
+  EXPECT_EQ(departures()[0].name(), "robot1");
+  EXPECT_EQ(departures()[0].reason(), "no sign of life for its lease of 5 s");
+  EXPECT_TRUE(eventually([&] { return present() == std::set<std::string>{"other"}; }));
+
+  // All within merge_wait_s: had the dead robot a place left, these would wait for it.
+  for (int i = 1; i <= 5; ++i) other.send_frame(1000'000 * kMs + i * 10 * kMs);
+  EXPECT_TRUE(eventually([&] { return frames.processed("other") >= 4; })) << node.err();
+
+  const int before = frames.processed("robot1");
+  auto again = play_live(domain);
+  again.insert(again.end(), {"--max-frames", "20"});
+  EXPECT_EQ(run_command(again).exit_code, 0);
+  EXPECT_TRUE(eventually([&] { return frames.processed("robot1") > before; })) << node.err();
+  ASSERT_TRUE(eventually([&] { return departures().size() == 2; })) << node.err();
+  EXPECT_EQ(departures()[1].name(), "robot1");
+  EXPECT_EQ(departures()[1].reason().find("lease"), std::string::npos) << "it ended in order";
+
+  node.signal(SIGTERM);
+  const CommandResult ended = node.wait();
+  EXPECT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_EQ(count_of(ended.err, "robot1: has gone: no sign of life"), 1u) << ended.err;
+  EXPECT_EQ(count_of(ended.err, "robot1: has gone"), 2u) << ended.err;
+  EXPECT_EQ(count_of(ended.err, "robot1: is on the bus"), 2u) << ended.err;
+}
+
+// The map of robots that were found is the map of robots that were named, and the offline one.
+TEST(Fleet, DiscoveredRobotsLiveEqualOffline) {
+  const TemporaryFolder folder;
+  const std::string demo = source("config/sim/demo.yaml");
+  const auto output = folder.path() / "offline";
+  const CommandResult offline = run_command({bin("pocd_map"), "--dataset", "sim", "--input", demo,
+                                             "--config", source("config/simulated.yaml"),
+                                             "--output", output.string(), "--max-frames", "40"});
+  ASSERT_EQ(offline.exit_code, 0) << offline.err;
+  const std::string summary = read_text(output / "summary.yaml");
+  const std::size_t at = summary.find("map_digest:");
+  ASSERT_NE(at, std::string::npos) << summary;
+  std::string digest = summary.substr(at + 12, summary.find('\n', at) - at - 12);
+  digest.erase(std::remove(digest.begin(), digest.end(), '"'), digest.end());
+
+  const TestDomain domain;
+  Process node(fleet_command(domain, {"--lossless"}));
+  Process mirror({bin("pocd_mirror"), "--until-end", "--domain", domain.text()});
+  const CommandResult played =
+      run_command({bin("pocd_play"), "--dataset", "sim", "--input", demo, "--fast", "--lossless",
+                   "--max-frames", "40", "--domain", domain.text()});
+  ASSERT_EQ(played.exit_code, 0) << played.err;
+  node.signal(SIGINT);
+  const CommandResult ended = node.wait();
+  ASSERT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_NE(ended.err.find("40 frames processed"), std::string::npos) << ended.err;
+  const CommandResult mirrored = mirror.wait();
+  EXPECT_NE(mirrored.out.find("digest " + digest), std::string::npos)
+      << mirrored.out << mirrored.err << "offline " << digest;
+}
+
+// Nothing ever comes on a segmentation topic that is announced and required.
+TEST(Fleet, ASilentStreamHoldsNobodyForEver) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  FrameWatch frames(bus);
+  RobotSender good(bus, "good", true), mute(bus, "mute", true);
+  Process node(fleet_command(domain, {"--lossless", "--set", "node.segmentation=required", "--set",
+                                      "node.silent_wait_s=0.5"}));
+  ASSERT_TRUE(eventually([&] {
+    return health.newest() != nullptr && frames.matched() && good.matched() && mute.matched();
+  }));
+  constexpr int kFrames = 45;  // more than a robot's readers and synchroniser hold
+  for (int i = 1; i <= kFrames; ++i) {
+    const StampNs stamp_ns = i * 33 * kMs;
+    good.send_frame(stamp_ns);
+    mute.send_odometry({"map", mute.camera_frame(), stamp_ns, {}});
+    mute.send_image(stamp_ns);
+  }
+  EXPECT_TRUE(eventually([&] { return frames.processed("good") == kFrames; }))
+      << frames.processed("good") << " " << node.err();
+  EXPECT_EQ(frames.processed("mute"), 0);
+  EXPECT_TRUE(
+      eventually([&] { return health.problem("rt/mute/segmentation", "silent_stream") == 1; }));
+  EXPECT_TRUE(eventually([&] {
+    for (const auto& robot : health.newest()->robots()) {
+      if (robot.name() == "mute") return robot.dropped() == kFrames;
+    }
+    return false;
+  }));
+  const auto said_of_mute = [&] {
+    for (const auto& robot : health.newest()->robots()) {
+      if (robot.name() == "mute") return robot.waiting_for();
+    }
+    return std::string("not there");
+  };
+  EXPECT_EQ(said_of_mute(), "going on without rt/mute/segmentation, which is silent");
+  // It speaks again, and is waited for again.
+  mute.send_labels((kFrames + 1) * 33 * kMs);
+  EXPECT_TRUE(eventually([&] { return health.newest() && said_of_mute().empty(); }));
+  for (int i = kFrames + 1; i <= kFrames + 3; ++i) {
+    good.send_frame(i * 33 * kMs);
+    mute.send_odometry({"map", mute.camera_frame(), i * 33 * kMs, {}});
+    if (i > kFrames + 1) mute.send_labels(i * 33 * kMs);
+    mute.send_image(i * 33 * kMs);
+  }
+  EXPECT_TRUE(eventually([&] { return frames.processed("mute") == 3; })) << node.err();
+  node.signal(SIGTERM);
+  EXPECT_EQ(node.wait().exit_code, 0);
+}
+
+// Object identifiers begin with the epoch: no two runs share one.
+TEST(Fleet, NodesAndRestartsHaveEpochsOfTheirOwn) {
+  const TestDomain domain;
+  std::set<std::string> epochs;
+  for (int start = 0; start < 2; ++start) {
+    Process first(fleet_command(domain)), second(fleet_command(domain));
+    for (Process* node : {&first, &second}) {
+      ASSERT_TRUE(eventually([&] { return node->err().find("epoch ") != std::string::npos; }));
+      const std::string said = node->err();
+      epochs.insert(said.substr(said.find("epoch ") + 6, 16));
+    }
+  }
+  EXPECT_EQ(epochs.size(), 4u);
+}
+
+TEST(Fleet, AWrongTypeOnARobotsTopicIsSaid) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> wrong(
+      bus, dds::topics::kCameraInfo, "rt/odd/depth/image_raw", kTestDelivery);
+  Process node(fleet_command(domain));
+  EXPECT_TRUE(eventually([&] {
+    return health.newest() != nullptr &&
+           health.problem("rt/odd/depth/image_raw", "wrong_type") == 1;
+  }));
+  EXPECT_TRUE(health.newest()->robots().empty());
+  node.signal(SIGTERM);
+  const CommandResult ended = node.wait();
+  EXPECT_NE(ended.err.find("announced with type sensor_msgs::msg::dds_::CameraInfo_, expected "
+                           "sensor_msgs::msg::dds_::Image_"),
+            std::string::npos)
+      << ended.err;
+}
+
+}  // namespace
+}  // namespace pocd

@@ -1,0 +1,116 @@
+// Several robots look at the same objects: nothing counts twice, and it is known who saw what.
+#include <gtest/gtest.h>
+
+#include "drive.hpp"
+
+namespace pocd {
+namespace {
+
+using test::kBoxClass;
+using test::room_with;
+using test::solid;
+
+const SceneObject kBox = solid(kBoxClass, {-0.3, 2.3}, {0.6, 0.4, 0.6});
+
+/// Looks from the same place at the same time by these robots, who see `scene`; the second one with
+/// noise of its own.
+class Crowd {
+ public:
+  explicit Crowd(std::vector<std::string> robots, int blind_columns_of_first = 0)
+      : robots_(std::move(robots)), blind_columns_(blind_columns_of_first) {}
+
+  void watch(const Scene& scene, int moments) {
+    for (int i = 0; i < moments; ++i) look(scene);
+  }
+  /// Moments until the box is reported as gone, or -1.
+  int moments_until_removed(const Scene& scene, int most) {
+    for (int i = 1; i <= most; ++i) {
+      look(scene);
+      for (const ObjectEvent& event : events) {
+        if (event.kind == EventKind::kRemoved) return i;
+      }
+    }
+    return -1;
+  }
+  std::vector<ObjectSnapshot> objects() const { return pipeline_.objects(); }
+
+  std::vector<ObjectEvent> events;
+
+ private:
+  void look(const Scene& scene) {
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      Frame frame = test::shoot(scene, test::swaying_camera(count_), count_);
+      test::add_noise(frame, config_.depth_noise, 3 + r);
+      frame.robot = robots_[r];
+      frame.stamp_ns += static_cast<StampNs>(r) * 30'000'000;  // less than a moment
+      if (r == 0 && blind_columns_ > 0) frame.depth_m.colRange(0, blind_columns_).setTo(0.0f);
+      const FrameResult result = pipeline_.process_frame(frame);
+      EXPECT_TRUE(result.accepted);
+      events.insert(events.end(), result.events.begin(), result.events.end());
+    }
+    ++count_;
+  }
+
+  std::vector<std::string> robots_;
+  int blind_columns_;
+  PipelineConfig config_ = test::room_config();
+  PocdPipeline pipeline_{config_};
+  std::uint64_t count_ = 0;
+};
+
+// Five moments seen by one robot and by three.
+TEST(TwoRobots, ALookFromTheSameMomentDoesNotCountAgain) {
+  Crowd one({"a"}), three({"a", "b", "c"});
+  for (Crowd* crowd : {&one, &three}) crowd->watch(room_with({kBox}), 5);
+  ASSERT_EQ(one.objects().size(), 1u);
+  ASSERT_EQ(three.objects().size(), 1u);
+  const ObjectSnapshot alone = one.objects()[0], together = three.objects()[0];
+  EXPECT_EQ(together.observations, alone.observations);
+  // The measured change is of millimetres, so E[v] hardly depends on which of the views counts; if
+  // all three counted, it would be as after fifteen moments.
+  Crowd longer({"a"});
+  longer.watch(room_with({kBox}), 15);
+  const double apart = longer.objects()[0].belief.stationarity() - alone.belief.stationarity();
+  ASSERT_GT(apart, 0.01);
+  EXPECT_NEAR(together.belief.stationarity(), alone.belief.stationarity(), 0.1 * apart);
+}
+
+TEST(TwoRobots, ARemovalTakesAsManyMomentsAsForOneRobot) {
+  int moments[2];
+  for (int robots = 1; robots <= 2; ++robots) {
+    Crowd crowd(robots == 1 ? std::vector<std::string>{"a"} : std::vector<std::string>{"a", "b"});
+    crowd.watch(room_with({kBox}), 20);
+    moments[robots - 1] = crowd.moments_until_removed(room_with({}), 40);
+  }
+  ASSERT_GT(moments[0], 1);
+  // One moment of noise: who sees more of the place decides which of two equal looks counts.
+  EXPECT_NEAR(moments[1], moments[0], 1);
+}
+
+// The first robot sees the left edge of the box only; the second one, all of it.
+TEST(TwoRobots, TheLookThatSawMoreCounts) {
+  Crowd crowd({"a", "b"}, 150);
+  crowd.watch(room_with({kBox}), 20);
+  Crowd best({"b"});
+  best.watch(room_with({kBox}), 20);
+  ASSERT_EQ(crowd.objects().size(), 1u);
+  ASSERT_EQ(best.objects().size(), 1u);
+  const double expected = best.objects()[0].belief.stationarity();
+  EXPECT_NEAR(crowd.objects()[0].belief.stationarity(), expected, 0.02);
+  const int moments = crowd.moments_until_removed(room_with({}), 40);
+  EXPECT_GT(moments, 1);
+}
+
+TEST(TwoRobots, WhoSawItIsKnown) {
+  Crowd crowd({"robot_b", "robot_a"});
+  crowd.watch(room_with({kBox}), 8);
+  ASSERT_EQ(crowd.objects().size(), 1u);
+  EXPECT_EQ(crowd.objects()[0].seen_by, (std::vector<std::string>{"robot_a", "robot_b"}));
+  EXPECT_EQ(crowd.objects()[0].last_robot, "robot_a");
+  ASSERT_FALSE(crowd.events.empty());
+  EXPECT_EQ(crowd.events[0].kind, EventKind::kAdded);
+  EXPECT_FALSE(crowd.events[0].robot.empty());
+}
+
+}  // namespace
+}  // namespace pocd
