@@ -10,11 +10,8 @@
 
 #include "geometry_msgs.h"
 #include "nav_msgs.h"
-#include "pocd/input/camera_model.hpp"
-#include "pocd/input/pose_quaternion.hpp"
-#include "pocd/map/map_follower.hpp"
 #include "pocd/input/message_checks.hpp"
-#include "pocd/map/map_delta.hpp"
+#include "pocd/map/map_follower.hpp"
 #include "pocd/pipeline/frame_result.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_msgs.h"

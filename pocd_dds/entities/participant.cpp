@@ -36,8 +36,6 @@ constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbe
 
 // The name has to outlive every participant.
 constexpr const char* kBackground = "pocd_background";
-// A process that dies without a word is noticed after this time; the default is 20 s.
-constexpr std::int32_t kLeaseS = 5, kAnnouncementS = 1;
 
 void set_transports(DomainParticipantQos& qos) {
   auto shared_memory = std::make_shared<rtps::SharedMemTransportDescriptor>();
@@ -124,11 +122,6 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   }
   DomainParticipantQos qos;
   factory->get_default_participant_qos(qos);
-  if (qos == PARTICIPANT_QOS_DEFAULT) {  // no profile of an operator
-    auto& discovery = qos.wire_protocol().builtin.discovery_config;
-    discovery.leaseDuration = {kLeaseS, 0};
-    discovery.leaseDuration_announcementperiod = {kAnnouncementS, 0};
-  }
   if (qos.transport().user_transports.empty() && qos.transport().use_builtin_transports) {
     set_transports(qos);
     warn_of_small_buffers();
