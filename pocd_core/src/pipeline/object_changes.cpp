@@ -225,6 +225,7 @@ void ObjectTracker::remove_or_confirm(Step& step) {
   }
   std::sort(ready.begin(), ready.end(), [](const auto* a, const auto* b) { return a->id < b->id; });
   for (LibraryObject* object : ready) {
+    if (object->confirmed) continue;  // where another one of them went, found on the way
     // Is it a known one that is about to be found gone? A removed one seen again from the side
     // grows into its old size within a few frames.
     if (explain(step, *object)) continue;
