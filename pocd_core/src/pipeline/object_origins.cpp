@@ -17,6 +17,7 @@ constexpr double kReach_m = 3.0;
 constexpr double kTakenShare = 0.25;
 /// This share of a thing's surface in places that were seen empty makes it an arrival.
 constexpr double kArrivedShare = 0.3;
+/// One thing left and another was found on the same pass of a camera when so little lies between.
 constexpr double kSamePass_s = 4.0;
 /// Nothing is moved unseen in less time.
 constexpr double kAbsence_s = 5.0;
