@@ -100,6 +100,22 @@ void rasterise(const Mesh& mesh, const BirdseyeCanvas& canvas, double lowest, do
   }
 }
 
+// Walls are as thin as the grid in this view: what stands higher spreads by one pixel, to be seen.
+void thicken(TopView& view) {
+  const TopView thin{view.height.clone(), view.triangle.clone()};
+  for (int y = 0; y < thin.height.rows; ++y) {
+    for (int x = 0; x < thin.height.cols; ++x) {
+      for (int v = std::max(0, y - 1); v <= std::min(y + 1, thin.height.rows - 1); ++v) {
+        for (int u = std::max(0, x - 1); u <= std::min(x + 1, thin.height.cols - 1); ++u) {
+          if (thin.height(v, u) <= view.height(y, x)) continue;
+          view.height(y, x) = thin.height(v, u);
+          view.triangle(y, x) = thin.triangle(v, u);
+        }
+      }
+    }
+  }
+}
+
 // Brightness of a triangle in light from the upper left, 0.78 to 1: gives flat greys a relief.
 double relief(const Mesh& mesh, int triangle) {
   const auto& t = mesh.triangles[static_cast<std::size_t>(triangle)];
@@ -147,7 +163,9 @@ void outline(const std::vector<ObjectSnapshot>& objects, BirdseyeCanvas& canvas)
     }
     cv::polylines(canvas.image(), polygon, true, kOutline, 1, cv::LINE_AA, kShift);
   }
-  // Labels last, so that no outline crosses them.
+}
+
+void label(const std::vector<ObjectSnapshot>& objects, BirdseyeCanvas& canvas) {
   for (const ObjectSnapshot& object : objects) {
     const Eigen::Vector3d& center = object.box.pose.position_W;
     canvas.label(std::to_string(to_index(object.id)), canvas.to_pixel(center.x(), center.y()),
@@ -192,8 +210,11 @@ cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objec
   canvas.draw_grid();
   TopView view;
   rasterise(mesh, canvas, lowest, highest, view);
-  paint(mesh, objects, view, ground, options, canvas);
+  thicken(view);
+  // Surfaces over outlines: a line that is left is a side of a box that nobody has seen.
   outline(objects, canvas);
+  paint(mesh, objects, view, ground, options, canvas);
+  label(objects, canvas);
   canvas.decorate(options.title,
                   std::to_string(objects.size()) + (objects.size() == 1 ? " object" : " objects"));
   return canvas.image();
