@@ -179,7 +179,7 @@ void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule,
   if (object.confirmed && !successor) successor = new_place_of(step, object);
   const RelocationMemory::Removed record{id,
                                          object.class_id,
-                                         object.box,
+                                         known_box(object),
                                          object.first_seen_ns,
                                          object.verified_ns,
                                          object.contested_since_ns,

@@ -21,6 +21,8 @@ constexpr double kArrivedShare = 0.3;
 constexpr double kSamePass_s = 4.0;
 /// Nothing is moved unseen in less time.
 constexpr double kAbsence_s = 5.0;
+/// An object that lost this share of its points lately is eaten away by free space.
+constexpr double kEatenShare = 0.12;
 /// This share of the points at one end was seen through.
 constexpr double kSeenEndShare = 0.25;
 
@@ -49,6 +51,7 @@ LibraryObject* ObjectTracker::part_of(const Step& step, const LibraryObject& fou
     LibraryObject* other = library_.find(id);
     // Both are there, and two solid things are not in one place.
     if (id != found.id && other->confirmed && other->class_id == found.class_id &&
+        other->first_seen_ns <= found.first_seen_ns &&
         other->verified_ns >= found.first_seen_ns && takes_place_of(step, found, *other)) {
       return other;
     }
@@ -61,7 +64,7 @@ LibraryObject* ObjectTracker::displaced_by(const Step& step, const LibraryObject
     LibraryObject* other = library_.find(id);
     if (id != found.id && other->confirmed && other->class_id == found.class_id &&
         other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        other->contested_ns >= found.first_seen_ns && may_be(found, other->box) &&
+        other->contested_ns >= found.first_seen_ns && may_be(found, known_box(*other)) &&
         takes_place_of(step, found, *other)) {
       return other;
     }
@@ -132,8 +135,8 @@ bool ObjectTracker::takes_place_of(const Step& step, const LibraryObject& found,
                                    const LibraryObject& known) const {
   const Eigen::Vector3d eye_W = step.cloud.T_W_C.translation();
   const double least_m = config_.state.least_depth_m;
-  return box_overlap(filled(found.box, eye_W, least_m), filled(known.box, eye_W, least_m), 0.0) >=
-         kTakenShare;
+  return box_overlap(filled(found.box, eye_W, least_m), filled(known_box(known), eye_W, least_m),
+                     0.0) >= kTakenShare;
 }
 
 bool ObjectTracker::may_be(const LibraryObject& found, const OrientedBox& known) const {
@@ -147,6 +150,12 @@ bool ObjectTracker::may_be(const LibraryObject& found, const OrientedBox& known)
   if (distance > config_.state.relocation_reach_m || !fits_inside(a, b, slack_m)) return false;
   // What is not seen whole yet may still grow into the size.
   return found.growing || found.cut || same_side(a, b, slack_m);
+}
+
+const OrientedBox& ObjectTracker::known_box(const LibraryObject& object) {
+  const auto surfels = static_cast<double>(object.model.surfels().size());
+  return static_cast<double>(object.lost) > kEatenShare * surfels ? object.reported_box
+                                                                  : object.box;
 }
 
 bool ObjectTracker::has_arrived(LibraryObject& object) const {
@@ -191,13 +200,13 @@ std::optional<ObjectTracker::Origin> ObjectTracker::origin_of(const Step& step,
     LibraryObject* other = library_.find(id);
     if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
         other->first_seen_ns >= found.first_seen_ns || other->verified_ns >= found.first_seen_ns ||
-        !may_be(found, other->box)) {
+        !may_be(found, known_box(*other))) {
       continue;
     }
     const bool contested = other->contested_ns >= found.first_seen_ns;
     if (!contested && found.first_seen_ns - other->verified_ns < absence_ns) continue;
     if (!has_arrived(found) && !left_then(other->contested_since_ns, other->contested_ns)) continue;
-    const double distance = distance_to(other->box);
+    const double distance = distance_to(known_box(*other));
     if (distance > state.relocation_reach_m) continue;
     if (!best || distance < best->distance_m) best = Origin{nullptr, other, distance};
   }

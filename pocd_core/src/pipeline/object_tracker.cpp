@@ -109,7 +109,7 @@ void ObjectTracker::update_matched(Step& step) {
     const Observation& observation = step.observations.list[match.observation];
     object.frames_seen_through = 0;
     if (moment_of(step, object).robots.size() == 1) ++object.frames_in_view;
-    if (config_.association.realign_displaced && match.stationary && object.confirmed &&
+    if (config_.association.realign_displaced && object.confirmed &&
         shift_object(step, object, match, sighting)) {
       continue;
     }
@@ -153,7 +153,11 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   }
   const bool suspicious = seen >= kShiftPoints && odd > kOddShare * seen;
   std::optional<Match> moved;
-  if (suspicious) {
+  if (!match.stationary) {
+    // Aligned already; what went farther is judged by its belief.
+    if (match.displacement_m > verified_m) return false;
+    moved = match;
+  } else if (suspicious) {
     moved = align_in_place(object, step.observations.list[match.observation], step.cloud.T_W_C,
                            config_.association);
   }
@@ -163,7 +167,7 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
     // seen yet to tell: fused, it would make the two places one model.
     const int looks = moment_of(step, object).robots.size() == 1 ? 1 : 0;
     object.frames_odd = suspicious ? object.frames_odd + looks : 0;
-    return suspicious && object.frames_odd <= kOddFrames;
+    return match.stationary && suspicious && object.frames_odd <= kOddFrames;
   }
   // Not fused: it would smear the model between the two places.
   if (moment_of(step, object).robots.size() == 1) ++object.frames_displaced;

@@ -98,6 +98,9 @@ class ObjectTracker {
   /// Makes `found` the continuation of a removed object, and reports it as MOVED.
   void report_move(Step& step, LibraryObject& found, const RelocationMemory::Removed& origin,
                    const std::string& rule);
+  /// The box of an object when all of it was there: that of its last report while free space eats
+  /// it away, else the present one.
+  static const OrientedBox& known_box(const LibraryObject& object);
   /// Whether a new object may be a known one elsewhere, by its size.
   bool may_be(const LibraryObject& found, const OrientedBox& known) const;
   /// Whether a thing found here and the known one would overlap, so that the known one is not there
