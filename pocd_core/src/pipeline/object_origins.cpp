@@ -64,7 +64,7 @@ LibraryObject* ObjectTracker::displaced_by(const Step& step, const LibraryObject
     LibraryObject* other = library_.find(id);
     if (id != found.id && other->confirmed && other->class_id == found.class_id &&
         other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        other->contested_ns >= found.first_seen_ns && may_be(found, known_box(*other)) &&
+        other->contested_ns >= found.first_seen_ns && may_be(step, found, known_box(*other)) &&
         takes_place_of(step, found, *other)) {
       return other;
     }
@@ -139,7 +139,8 @@ bool ObjectTracker::takes_place_of(const Step& step, const LibraryObject& found,
                      0.0) >= kTakenShare;
 }
 
-bool ObjectTracker::may_be(const LibraryObject& found, const OrientedBox& known) const {
+bool ObjectTracker::may_be(const Step& step, const LibraryObject& found,
+                           const OrientedBox& known) const {
   const double slack_m = like_size_slack_m();
   // Of a thing that was seen from one side its depth is not known.
   OrientedBox a = found.box, b = known;
@@ -148,8 +149,24 @@ bool ObjectTracker::may_be(const LibraryObject& found, const OrientedBox& known)
   if (alike(a, b, slack_m)) return true;
   const double distance = (a.pose.position_W - b.pose.position_W).norm();
   if (distance > config_.state.relocation_reach_m || !fits_inside(a, b, slack_m)) return false;
-  // What is not seen whole yet may still grow into the size.
-  return found.growing || found.cut || same_side(a, b, slack_m);
+  if (same_side(a, b, slack_m)) return true;
+  // What is not seen whole yet may still grow into the size. What stood behind need not have come
+  // from anywhere.
+  return (found.growing || found.cut) && !revealed_by(step, found, known);
+}
+
+bool ObjectTracker::revealed_by(const Step& step, const LibraryObject& found,
+                                const OrientedBox& known) const {
+  const Eigen::Vector3d eye_W = step.cloud.T_W_C.translation();
+  const double least_m = config_.state.least_depth_m;
+  // Both were not there at once if they overlap.
+  if (box_overlap(filled(found.box, eye_W, least_m), filled(known, eye_W, least_m), 0.0) > 0.0)
+    return false;
+  std::size_t hidden = 0;
+  for (const Surfel& s : found.model.surfels()) {
+    if (hides(known, eye_W, s.point_W.cast<double>())) ++hidden;
+  }
+  return 2 * hidden > found.model.surfels().size();
 }
 
 const OrientedBox& ObjectTracker::known_box(const LibraryObject& object) {
@@ -187,7 +204,7 @@ std::optional<ObjectTracker::Origin> ObjectTracker::origin_of(const Step& step,
   std::optional<Origin> best;
   for (const auto& removed : relocations_.recent(now_ns, state.relocation_window_s)) {
     const double distance = distance_to(removed.box);
-    if (removed.class_id != found.class_id || !may_be(found, removed.box)) continue;
+    if (removed.class_id != found.class_id || !may_be(step, found, removed.box)) continue;
     // What was seen in its place when the new one was there, too, is another thing.
     if (removed.verified_ns >= found.first_seen_ns) continue;
     if (!has_arrived(found) && (distance > state.relocation_reach_m ||
@@ -200,7 +217,7 @@ std::optional<ObjectTracker::Origin> ObjectTracker::origin_of(const Step& step,
     LibraryObject* other = library_.find(id);
     if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
         other->first_seen_ns >= found.first_seen_ns || other->verified_ns >= found.first_seen_ns ||
-        !may_be(found, known_box(*other))) {
+        !may_be(step, found, known_box(*other))) {
       continue;
     }
     const bool contested = other->contested_ns >= found.first_seen_ns;
@@ -229,6 +246,9 @@ LibraryObject* ObjectTracker::new_place_of(const Step& step, const LibraryObject
     if (!open) continue;
     const auto origin = origin_of(step, *other);
     if (!named && (!origin || origin->live != &object)) continue;
+    if (named && revealed_by(step, *other, known_box(object)) &&
+        !may_be(step, *other, known_box(object)))
+      continue;
     // Aligned with it and found alike.
     const double distance_m = named ? 0.0 : origin->distance_m;
     if (!best || distance_m < best_distance) best = other, best_distance = distance_m;

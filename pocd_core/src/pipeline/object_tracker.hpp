@@ -102,7 +102,9 @@ class ObjectTracker {
   /// it away, else the present one.
   static const OrientedBox& known_box(const LibraryObject& object);
   /// Whether a new object may be a known one elsewhere, by its size.
-  bool may_be(const LibraryObject& found, const OrientedBox& known) const;
+  bool may_be(const Step& step, const LibraryObject& found, const OrientedBox& known) const;
+  /// Whether the new object may have stood there all the time, hidden by the box of a known one.
+  bool revealed_by(const Step& step, const LibraryObject& found, const OrientedBox& known) const;
   /// Whether a thing found here and the known one would overlap, so that the known one is not there
   /// any more.
   bool takes_place_of(const Step& step, const LibraryObject& found,

@@ -95,6 +95,25 @@ bool same_side(const OrientedBox& part, const OrientedBox& whole, double slack_m
   return same(p[2], w[2]) && (same(p[0], w[0]) || same(p[0], w[1]));
 }
 
+bool hides(const OrientedBox& box, const Eigen::Vector3d& eye_W, const Eigen::Vector3d& point_W) {
+  const Eigen::AngleAxisd turn(-box.pose.yaw_rad, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d from = turn * (eye_W - box.pose.position_W);
+  const Eigen::Vector3d along = turn * (point_W - eye_W);
+  // Shares of the way at which the line is between the sides of each axis.
+  double enter = 0.0, leave = 1.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double half_m = 0.5 * box.size_m[axis];
+    if (std::abs(along[axis]) < 1e-9) {
+      if (std::abs(from[axis]) > half_m) return false;
+      continue;
+    }
+    const double a = (-half_m - from[axis]) / along[axis], b = (half_m - from[axis]) / along[axis];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  return enter <= leave;
+}
+
 OrientedBox filled(const OrientedBox& box, const Eigen::Vector3d& eye_W, double least_m) {
   OrientedBox result = box;
   const Eigen::Vector3d away_W = box.pose.position_W - eye_W;

@@ -43,6 +43,9 @@ bool fits_inside(const OrientedBox& part, const OrientedBox& whole, double slack
 /// each within 20 % or `slack_m`.
 bool same_side(const OrientedBox& part, const OrientedBox& whole, double slack_m);
 
+/// Whether a box stands between an eye and a point [m, W].
+bool hides(const OrientedBox& box, const Eigen::Vector3d& eye_W, const Eigen::Vector3d& point_W);
+
 /// The box with horizontal sizes of at least `least_m`, extended away from the eye: of a thing that
 /// was seen from one side only its near face is known.
 OrientedBox filled(const OrientedBox& box, const Eigen::Vector3d& eye_W, double least_m);
