@@ -79,6 +79,29 @@ std::optional<std::size_t> half_seen(const std::vector<Sample>& samples) {
   return frames[(frames.size() - 1) / 2];
 }
 
+/// Samples of the old and of the new place of a change.
+struct Places {
+  std::vector<Sample> before, after;
+};
+
+/// A change that nobody could see in its visit is one of the next visit, unless the object changes
+/// again there.
+void carry_over(std::size_t next_visit, std::vector<SeenChange>& changes,
+                std::vector<Places>& places) {
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    if (changes[c].visit + 1 != next_visit || half_seen(places[c].before) ||
+        half_seen(places[c].after) ||
+        std::any_of(changes.begin(), changes.end(), [&](const SeenChange& other) {
+          return other.visit == next_visit && other.change.name == changes[c].change.name;
+        })) {
+      continue;
+    }
+    changes[c].visit = next_visit;
+    for (auto* samples : {&places[c].before, &places[c].after})
+      for (Sample& sample : *samples) sample.first_seen.reset();
+  }
+}
+
 double part_distance(const ScenePart& part, const Eigen::Vector3d& p_P) {
   const Eigen::Vector3d half = part.size_m / 2.0;
   if (part.shape == Shape::kBox) {
@@ -143,9 +166,6 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
     truth.surface.visible.push_back({voxel.x, voxel.y, voxel.z});
   }
 
-  struct Places {
-    std::vector<Sample> before, after;
-  };
   std::vector<Places> places;
   const double spacing_m = kSampleSpacing * options.map_voxel_m;
   for (std::size_t visit = 0; visit <= last; ++visit) {
@@ -164,7 +184,10 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
   const CameraModel coarse = reduced(scenario.camera, 0.25), half = reduced(scenario.camera, 0.5);
   for (std::size_t i = 0; i < schedule.frames().size(); ++i) {
     const SimFrameTime& when = schedule.frames()[i];
-    if (truth.visit_begin.size() == when.visit) truth.visit_begin.push_back(i);
+    if (truth.visit_begin.size() == when.visit) {
+      truth.visit_begin.push_back(i);
+      carry_over(when.visit, truth.changes, places);
+    }
     if (when.visit == 0) continue;
     Frame frame;
     frame.T_W_C = schedule.camera_at(when);

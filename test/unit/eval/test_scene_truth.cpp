@@ -59,6 +59,27 @@ TEST(SceneTruth, KnowsWhenAChangeIsInClearSight) {
   EXPECT_GT(*truth.changes[2].clear_frame(), begin + 30);
 }
 
+TEST(SceneTruth, AChangeBehindAScreenIsAskedWhenTheScreenIsGone) {
+  Scenario scenario = two_visits();
+  SceneObject screen = box_object("screen", 4.5, 1.0);
+  screen.parts[0].size_m = {9.0, 0.1, 2.0};
+  screen.parts[0].T_O_P = upright_pose({0, 0, 1.0}, 0.0);
+  const SceneObject hidden = box_object("hidden", 4.5, 1.6), late = box_object("late", 5.5, 1.6);
+  scenario.visits = {{"before", {screen}},
+                     {"behind", {screen, hidden, late}},
+                     {"in sight", {hidden}},
+                     {"after", {hidden}}};
+  const SceneTruth truth = scene_truth(scenario, SceneTruthOptions(), nullptr);
+  ASSERT_EQ(truth.changes.size(), 4u);
+  for (const SeenChange& seen : truth.changes) {
+    EXPECT_EQ(seen.visit,
+              seen.change.kind == ChangeKind::kAdded && seen.change.name == "late" ? 1u : 2u)
+        << seen.change.name << ": what came and went unseen stays where it was";
+    EXPECT_EQ(seen.clear_frame().has_value(), seen.change.name != "late" || seen.visit == 2)
+        << seen.change.name;
+  }
+}
+
 TEST(SceneTruth, SurfaceDistanceIsExactForABox) {
   Scene scene;
   scene.objects = {box_object("a", 0, 0)};

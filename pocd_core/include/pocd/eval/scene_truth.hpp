@@ -22,6 +22,8 @@ struct SceneTruthOptions {
 /// the run, over all robots.
 struct SeenChange {
   TruthChange change;
+  /// In which it happened or, when it could not be seen there, the first later one in which it can,
+  /// unless the object changes once more before.
   std::size_t visit = 1;
   /// First frame by which half of what the visit ever sees through the old place, or sees of the
   /// object in its new place, has been seen; nothing when that is less than 10 sample points (grid
