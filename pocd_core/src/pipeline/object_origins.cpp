@@ -51,8 +51,8 @@ LibraryObject* ObjectTracker::part_of(const Step& step, const LibraryObject& fou
     LibraryObject* other = library_.find(id);
     // Both are there, and two solid things are not in one place.
     if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->first_seen_ns <= found.first_seen_ns &&
-        other->verified_ns >= found.first_seen_ns && takes_place_of(step, found, *other)) {
+        other->first_seen_ns <= found.first_seen_ns && other->verified_ns >= found.first_seen_ns &&
+        takes_place_of(step, found, *other)) {
       return other;
     }
   }
@@ -152,7 +152,9 @@ bool ObjectTracker::may_be(const Step& step, const LibraryObject& found,
   if (same_side(a, b, slack_m)) return true;
   // What is not seen whole yet may still grow into the size. What stood behind need not have come
   // from anywhere.
-  return (found.growing || found.cut) && !revealed_by(step, found, known);
+  const double higher_m = b.size_m.z() - a.size_m.z();
+  const bool may_grow_up = found.cut_above || higher_m <= std::max(slack_m, 0.2 * b.size_m.z());
+  return (found.growing || found.cut) && may_grow_up && !revealed_by(step, found, known);
 }
 
 bool ObjectTracker::revealed_by(const Step& step, const LibraryObject& found,

@@ -28,6 +28,7 @@ constexpr int kPresentPoints = 30;
 constexpr double kPresentShare = 0.8;
 /// An outline that is cut off by more than this share belongs to something that is not seen whole.
 constexpr double kCutShare = 0.1;
+constexpr double kCutAboveShare = 0.2;
 /// Its place is in question when this share of the points in view is seen through or covered.
 constexpr double kContestedShare = 0.25;
 
@@ -275,6 +276,7 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) 
   object.gained += static_cast<std::size_t>(added);
   object.growing = added > kGrowingShare * static_cast<double>(object.model.surfels().size());
   object.cut = observation.cut_share > kCutShare;
+  object.cut_above = observation.cut_above_share > kCutAboveShare;
   object.icp_target.reset();
   Moment& moment = moment_of(step, object);
   if (moment.robots.size() == 1 || !moment.observed) ++object.observations;

@@ -306,34 +306,47 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config,
 /// Outlines of the observations: where each is cut off.
 void find_cuts(const OrganizedCloud& cloud, const DepthNoise& noise, double spacing_m,
                Observations& out) {
-  std::vector<int> outline(out.list.size(), 0), cut(out.list.size(), 0);
-  const auto look = [&](std::int32_t i, std::int32_t j) {
+  struct Outline {
+    int length = 0, cut = 0;
+    int at_limit = 0;  ///< of the cuts, by the depth limit
+  };
+  std::vector<Outline> sides(out.list.size()), tops(out.list.size());
+  const auto look = [&](std::int32_t i, std::int32_t j, std::vector<Outline>& outlines) {
     const std::int32_t owner = out.observation_of[i];
     if (j >= 0 && out.observation_of[j] == owner) return;
-    ++outline[owner];
+    Outline& outline = outlines[owner];
+    ++outline.length;
     if (j < 0) {
-      ++cut[owner];
+      ++outline.cut;
       return;
     }
     const float z = cloud.depth_m[i], next = cloud.depth_m[j];
     const float step = static_cast<float>(spacing_m + 3.0 * noise.sigma(z));
     if (next <= 0.0f) {
-      --outline[owner];  // a hole tells nothing
-    } else if (next < z - step || (cloud.kind[j] == PixelKind::kNone && next < z + step)) {
-      ++cut[owner];
+      --outline.length;  // a hole tells nothing
+    } else if (next < z - step) {
+      ++outline.cut;
+    } else if (cloud.kind[j] == PixelKind::kNone && next < z + step) {
+      ++outline.cut;
+      ++outline.at_limit;
     }
   };
   for (std::int32_t row = 0; row < cloud.height; ++row) {
     for (std::int32_t col = 0; col < cloud.width; ++col) {
       const std::int32_t i = row * cloud.width + col;
       if (out.observation_of[i] == Observations::kNone) continue;
-      look(i, col > 0 ? i - 1 : -1);
-      look(i, col + 1 < cloud.width ? i + 1 : -1);
-      look(i, row > 0 ? i - cloud.width : -1);
+      look(i, col > 0 ? i - 1 : -1, sides);
+      look(i, col + 1 < cloud.width ? i + 1 : -1, sides);
+      look(i, row > 0 ? i - cloud.width : -1, tops);
     }
   }
   for (std::size_t k = 0; k < out.list.size(); ++k) {
-    if (outline[k] > 0) out.list[k].cut_share = static_cast<double>(cut[k]) / outline[k];
+    const Outline &side = sides[k], &top = tops[k];
+    const int length = side.length + top.length;
+    if (length > 0) out.list[k].cut_share = static_cast<double>(side.cut + top.cut) / length;
+    // What goes on beyond the depth limit goes on at the same height.
+    if (top.length > 0)
+      out.list[k].cut_above_share = static_cast<double>(top.cut - top.at_limit) / top.length;
   }
 }
 

@@ -52,11 +52,12 @@ struct LibraryObject {
   int frames_in_view = 0;           ///< tentative only
   int frames_seen_through = 0;      ///< in a row
   int frames_displaced = 0;         ///< in a row
-  int frames_odd = 0;               ///< in a row, much of it beside its surface but not aligned elsewhere
+  int frames_odd = 0;               ///< in a row, much of it beside its surface, aligned in place
   OrientedBox reported_box;         ///< as in the last event
   OrientedBox expected_box;         ///< of one that moved: where all of it must be; else of size 0
   bool growing = false;             ///< the last observation added a notable share of its points
   bool cut = false;                 ///< the last observation went on out of sight
+  bool cut_above = false;           ///< the same, above it
   std::size_t gained = 0;           ///< points since the last event
   std::size_t lost = 0;             ///< points since the last event
   std::optional<StampNs> added_ns;  ///< when reported as new; unset for what was known before

@@ -26,6 +26,9 @@ struct Observation {
   /// Share of its outline (sides and top) where the image, the depth limit or something nearer cuts
   /// it off: above about 0.1 it goes on unseen.
   double cut_share = 0.0;
+  /// The same of the upper outline alone, without the depth limit: above a fifth or so, its height is
+  /// not known.
+  double cut_above_share = 0.0;
 };
 
 struct Observations {
