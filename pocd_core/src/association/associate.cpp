@@ -11,8 +11,6 @@ namespace {
 
 /// Share of what is visible of an object that decides for it: above one half is a majority.
 constexpr double kMajority = 0.5;
-/// A first alignment of a thing that may have shifted tolerates so many times the usual residuals.
-constexpr double kWideScale = 4.0;
 /// Fewer visible points than this decide nothing.
 constexpr int kMinVisible = 5;
 /// Share of an observation near an object's surface that makes it a piece of that object.
@@ -146,16 +144,8 @@ std::optional<Match> align_in_place(LibraryObject& object, const Observation& ob
   if (object.model.surfels().empty() || observation.points.empty()) return std::nullopt;
   const Points source = icp_source(observation, config);
   const auto target = target_of(object, config.icp_max_distance_m);
-  const IcpOptions options = icp_options(object, config);
-  IcpResult best = point_to_plane_icp(*target, source, options);
-  // A face that shifted by more than the robust scale is an outlier to the faces that slid along
-  // themselves: with a wide scale it is not.
-  IcpOptions wide = options;
-  wide.robust_scale_m = kWideScale * options.robust_scale_m;
-  const IcpResult coarse = point_to_plane_icp(*target, source, wide);
-  const IcpResult fine = point_to_plane_icp(*target, source, options, coarse.T_target_source);
-  if (fine.dissimilarity < best.dissimilarity) best = fine;
-  return match_of(best, source, T_W_C, config);
+  return match_of(point_to_plane_icp(*target, source, icp_options(object, config)), source, T_W_C,
+                  config);
 }
 
 AssociationResult associate(const Candidate* candidates, std::size_t count,

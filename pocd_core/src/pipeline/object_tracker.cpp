@@ -156,11 +156,17 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   std::optional<Match> moved;
   if (!match.stationary) {
     // Aligned already; what went farther is judged by its belief.
-    if (match.displacement_m > verified_m) return false;
+    if (match.displacement_m > verified_m || !suspicious) return false;
     moved = match;
   } else if (suspicious) {
     moved = align_in_place(object, step.observations.list[match.observation], step.cloud.T_W_C,
                            config_.association);
+  }
+  // An edge that fits says nothing of where the rest went.
+  const Eigen::Vector3d& center_W = object.box.pose.position_W;
+  if (moved &&
+      (moved->T_new_old * center_W - center_W).norm() > moved->displacement_m + 2.0 * verified_m) {
+    moved.reset();
   }
   if (!moved || moved->displacement_m < 0.6 * verified_m) {
     object.frames_displaced = 0;
