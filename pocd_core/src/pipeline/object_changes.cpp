@@ -257,9 +257,11 @@ void ObjectTracker::report_changes(Step& step) {
     const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
     // Lost points at one end and gained as many at the other: it slid along itself.
     const double least = kSlidShare * static_cast<double>(object->model.surfels().size());
-    if ((static_cast<double>(object->lost) > least && static_cast<double>(object->gained) > least &&
+    const bool slid =
+        (static_cast<double>(object->lost) > least && static_cast<double>(object->gained) > least &&
          shift_m > notable_m && growth < notable_m) ||
-        slide(step, *object)) {
+        slide(step, *object);
+    if (slid) {
       ObjectEvent& event = add_event(step, EventKind::kMoved, *object, "slid");
       event.previous_box = object->reported_box;
     } else if (shift_m > notable_m || growth > notable_m) {
@@ -269,7 +271,8 @@ void ObjectTracker::report_changes(Step& step) {
       continue;
     }
     object->reported_box = object->box;
-    object->gained = object->lost = 0;
+    // One that may be sliding is asked again with all that it gained and lost.
+    if (slid || !object->grew_ns) object->gained = object->lost = 0;
   }
   for (const LibraryObject* object : touched)
     step.result.changed_objects.push_back(snapshot(*object));

@@ -23,8 +23,8 @@ constexpr double kSamePass_s = 4.0;
 constexpr double kAbsence_s = 5.0;
 /// An object that lost this share of its points lately is eaten away by free space.
 constexpr double kEatenShare = 0.12;
-/// This share of the points at one end was seen through.
-constexpr double kSeenEndShare = 0.25;
+/// This share of the points at one end was seen through, lately or for good.
+constexpr double kSeenEndShare = 0.2;
 
 }  // namespace
 
@@ -272,44 +272,73 @@ void ObjectTracker::link_additions(Step& step) {
   }
 }
 
-bool ObjectTracker::slide(Step& step, LibraryObject& object) {
-  if (!config_.state.explain_new) return false;
-  const OrientedBox then = object.reported_box;
+std::optional<ObjectTracker::GrownEnd> ObjectTracker::grown_end(const Step& step,
+                                                                const LibraryObject& object,
+                                                                const OrientedBox& then) const {
   const StampNs before_ns = step.frame.stamp_ns - static_cast<StampNs>(kAbsence_s * 1e9);
-  if (object.first_seen_ns >= before_ns || object.gained == 0) return false;
-  // Along the axis on which it grew.
-  const Eigen::Vector3d grown = object.box.size_m - then.size_m;
-  const int axis = grown.x() >= grown.y() ? 0 : 1;
-  const double yaw = then.pose.yaw_rad + (axis == 0 ? 0.0 : 0.5 * M_PI);
-  const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
-  const double shift_m = 2.0 * (object.box.pose.position_W - then.pose.position_W).dot(along_W);
-  const double length_m = then.size_m[axis];
-  if (std::abs(shift_m) < 2.0 * config_.map.voxel_size_m || std::abs(shift_m) > length_m ||
-      std::abs(std::abs(shift_m) - grown[axis]) > 0.5 * std::abs(shift_m)) {
-    return false;
+  if (!config_.state.explain_new || object.first_seen_ns >= before_ns || object.gained == 0)
+    return std::nullopt;
+  // How far each end of each axis went.
+  GrownEnd end;
+  double grown_m = 2.0 * config_.map.voxel_size_m;
+  for (const int axis : {0, 1}) {
+    const double yaw = then.pose.yaw_rad + (axis == 0 ? 0.0 : 0.5 * M_PI);
+    const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
+    const double center_m = (object.box.pose.position_W - then.pose.position_W).dot(along_W);
+    const double wider_m = 0.5 * (object.box.size_m[axis] - then.size_m[axis]);
+    for (const double sign : {-1.0, 1.0}) {
+      const double m = wider_m + sign * center_m;
+      if (m <= grown_m || m > then.size_m[axis]) continue;
+      grown_m = m;
+      end = {sign * along_W, 0.5 * then.size_m[axis], m};
+    }
   }
-  // What was gained lies where nothing was, and the other end was seen through.
-  const double sign = shift_m > 0.0 ? 1.0 : -1.0;
-  const double new_end_m = 0.5 * length_m, old_end_m = new_end_m - std::abs(shift_m);
+  if (end.grown_m == 0.0) return std::nullopt;
   Points gained_W;
-  int end = 0, through = 0;
   for (const Surfel& s : object.model.surfels()) {
-    const double at_m = sign * (s.point_W.cast<double>() - then.pose.position_W).dot(along_W);
-    if (at_m > new_end_m) gained_W.push_back(s.point_W);
-    if (at_m < -old_end_m) ++end, through += s.seen_through > 0;
+    const Eigen::Vector3d offset_W = s.point_W.cast<double>() - then.pose.position_W;
+    if (offset_W.dot(end.along_W) > end.half_length_m) gained_W.push_back(s.point_W);
   }
-  if (end == 0 || through < kSeenEndShare * end ||
-      views_.seen_empty_share(gained_W, before_ns, config_.map.max_depth_m,
+  if (views_.seen_empty_share(gained_W, before_ns, config_.map.max_depth_m,
                               2.0 * config_.map.voxel_size_m) < kArrivedShare) {
+    return std::nullopt;
+  }
+  return end;
+}
+
+bool ObjectTracker::slide(Step& step, LibraryObject& object) {
+  if (object.grew_ns && step.frame.stamp_ns - *object.grew_ns >
+                            static_cast<StampNs>(config_.state.relocation_window_s * 1e9)) {
+    object.grew_ns.reset();
+  }
+  const OrientedBox then = object.grew_ns ? object.box_before_growth : object.reported_box;
+  const auto end = grown_end(step, object, then);
+  if (!end) return false;
+  // As far as the new end lies beyond the old one, the other end must have been left.
+  auto& surfels = object.model.surfels();
+  const auto left_behind = [&](const Surfel& s) {
+    const Eigen::Vector3d offset_W = s.point_W.cast<double>() - then.pose.position_W;
+    return -offset_W.dot(end->along_W) > end->half_length_m - end->grown_m;
+  };
+  std::size_t there = 0, through = 0;
+  for (const Surfel& s : surfels) {
+    if (!left_behind(s)) continue;
+    ++there;
+    through += s.seen_through > 0;
+  }
+  // What was eroded there is gone for good.
+  const std::size_t gone = through + object.lost;
+  if (static_cast<double>(gone) < kSeenEndShare * static_cast<double>(there + object.lost)) {
+    if (!object.grew_ns) object.box_before_growth = then, object.grew_ns = step.frame.stamp_ns;
     return false;
   }
-  auto& surfels = object.model.surfels();
   for (Surfel& s : surfels) {
-    const double at_m = sign * (s.point_W.cast<double>() - then.pose.position_W).dot(along_W);
-    if (at_m < -old_end_m) s.seen_through = 255;
+    if (left_behind(s)) s.seen_through = 255;
   }
   object.model.erode(255);
   object.icp_target.reset();
+  object.grew_ns.reset();
+  object.reported_box = then;
   refit_box(step, object);
   return true;
 }

@@ -93,6 +93,14 @@ class ObjectTracker {
   /// A known object that grew at one end into what was empty before, while the other end was seen
   /// through, slid along itself: true after its model has been cut to its size.
   bool slide(Step& step, LibraryObject& object);
+  /// The end of an object that went farther than that of an earlier box, into what was empty.
+  struct GrownEnd {
+    Eigen::Vector3d along_W = Eigen::Vector3d::Zero();  ///< horizontal unit vector to that end
+    double half_length_m = 0.0;                         ///< of the earlier box, along it
+    double grown_m = 0.0;
+  };
+  std::optional<GrownEnd> grown_end(const Step& step, const LibraryObject& object,
+                                    const OrientedBox& then) const;
   /// Whether the box differs from the last report by more than noise.
   bool notable_change(const LibraryObject& object) const;
   /// Makes `found` the continuation of a removed object, and reports it as MOVED.

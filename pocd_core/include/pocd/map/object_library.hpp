@@ -55,6 +55,8 @@ struct LibraryObject {
   int frames_odd = 0;               ///< in a row, much of it beside its surface, aligned in place
   OrientedBox reported_box;         ///< as in the last event
   OrientedBox expected_box;         ///< of one that moved: where all of it must be; else of size 0
+  std::optional<StampNs> grew_ns;   ///< when it was seen to grow into what was empty before
+  OrientedBox box_before_growth;    ///< as reported before that
   bool growing = false;             ///< the last observation added a notable share of its points
   bool cut = false;                 ///< the last observation went on out of sight
   bool cut_above = false;           ///< the same, above it
