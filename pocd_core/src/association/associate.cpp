@@ -221,7 +221,7 @@ AssociationResult associate(const Candidate* candidates, std::size_t count,
             [](const Match& a, const Match& b) { return a.candidate < b.candidate; });
   for (std::size_t j = 0; j < observations.list.size(); ++j) {
     if (taken[j]) continue;
-    if (best_share[j] >= kPieceShare) {
+    if (config.grow_by_pieces && best_share[j] >= kPieceShare) {
       result.pieces.push_back({static_cast<std::int32_t>(j), best_candidate[j]});
     } else {
       result.unassigned.push_back(static_cast<std::int32_t>(j));

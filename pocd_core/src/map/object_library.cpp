@@ -97,29 +97,6 @@ std::vector<ObjectId> ObjectLibrary::near(const Eigen::Vector3d& center_W, doubl
   return ids;
 }
 
-bool ObjectLibrary::any_near(const Eigen::Vector3d& center_W, double radius_m,
-                             const std::function<bool(const LibraryObject&)>& test) const {
-  const auto looks_fit = [&](std::int32_t x, std::int32_t y) {
-    ++visits_;
-    const auto it = grid_.find(cell_at(x, y));
-    if (it == grid_.end()) return false;
-    visits_ += it->second.size();
-    return std::any_of(it->second.begin(), it->second.end(),
-                       [&](ObjectId id) { return test(*objects_.at(id)); });
-  };
-  const std::int32_t cx = cell_of(center_W.x()), cy = cell_of(center_W.y());
-  const auto rings = static_cast<std::int32_t>(std::ceil(radius_m / kCellM));
-  for (std::int32_t ring = 0; ring <= rings; ++ring) {
-    for (std::int32_t x = -ring; x <= ring; ++x) {
-      const std::int32_t step = std::abs(x) == ring ? 1 : 2 * ring;  // sides, or top and bottom
-      for (std::int32_t y = -ring; y <= ring; y += step) {
-        if (looks_fit(cx + x, cy + y)) return true;
-      }
-    }
-  }
-  return false;
-}
-
 ObjectSnapshot snapshot(const LibraryObject& object) {
   ObjectSnapshot s;
   s.id = object.id;

@@ -26,6 +26,11 @@ constexpr double kEatenShare = 0.12;
 /// This share of the points at one end was seen through, lately or for good.
 constexpr double kSeenEndShare = 0.2;
 
+/// Whether the known object was there before the new one, and not seen in its place since.
+bool unseen_since(const LibraryObject& known, const LibraryObject& found) {
+  return known.first_seen_ns < found.first_seen_ns && known.verified_ns < found.first_seen_ns;
+}
+
 }  // namespace
 
 bool ObjectTracker::explain(Step& step, LibraryObject& found) {
@@ -46,62 +51,53 @@ bool ObjectTracker::explain(Step& step, LibraryObject& found) {
   return false;
 }
 
-LibraryObject* ObjectTracker::part_of(const Step& step, const LibraryObject& found) {
-  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
+template <class Test>
+LibraryObject* ObjectTracker::first_known(const LibraryObject& found, double reach_m,
+                                          const Test& test) {
+  for (const ObjectId id : library_.near(found.box.pose.position_W, reach_m)) {
     LibraryObject* other = library_.find(id);
-    // Both are there, and two solid things are not in one place.
-    if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->first_seen_ns <= found.first_seen_ns && other->verified_ns >= found.first_seen_ns &&
-        takes_place_of(step, found, *other)) {
-      return other;
-    }
+    if (id != found.id && other->confirmed && test(*other)) return other;
   }
   return nullptr;
 }
 
+LibraryObject* ObjectTracker::part_of(const Step& step, const LibraryObject& found) {
+  return first_known(found, found.box.size_m.norm(), [&](const LibraryObject& other) {
+    // Both are there, and two solid things are not in one place.
+    return other.class_id == found.class_id && other.first_seen_ns <= found.first_seen_ns &&
+           other.verified_ns >= found.first_seen_ns && takes_place_of(step, found, other);
+  });
+}
+
 LibraryObject* ObjectTracker::displaced_by(const Step& step, const LibraryObject& found) {
-  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        other->contested_ns >= found.first_seen_ns && may_be(step, found, known_box(*other)) &&
-        takes_place_of(step, found, *other)) {
-      return other;
-    }
-  }
-  return nullptr;
+  return first_known(found, found.box.size_m.norm(), [&](const LibraryObject& other) {
+    return other.class_id == found.class_id && unseen_since(other, found) &&
+           other.contested_ns >= found.first_seen_ns && may_be(step, found, known_box(other)) &&
+           takes_place_of(step, found, other);
+  });
 }
 
 LibraryObject* ObjectTracker::replaced_by(const Step& step, const LibraryObject& found) {
   if (!config_.state.explain_new) return nullptr;
-  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    if (id != found.id && other->confirmed && other->class_id != found.class_id &&
-        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        other->contested_ns == step.frame.stamp_ns &&
-        box_overlap(found.box, other->box, config_.state.least_depth_m) >= kReplacedShare) {
-      return other;
-    }
-  }
-  return nullptr;
+  return first_known(found, found.box.size_m.norm(), [&](const LibraryObject& other) {
+    return other.class_id != found.class_id && unseen_since(other, found) &&
+           other.contested_ns == step.frame.stamp_ns &&
+           box_overlap(found.box, other.box, config_.state.least_depth_m) >= kReplacedShare;
+  });
 }
 
 LibraryObject* ObjectTracker::completed_by(const LibraryObject& found) {
   const double margin_m = 2.0 * config_.map.voxel_size_m;
-  for (const ObjectId id : library_.near(found.box.pose.position_W, kReach_m)) {
-    LibraryObject* other = library_.find(id);
-    if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
-        other->expected_box.size_m.isZero() || other->frames_seen_through > 0) {
-      continue;
+  return first_known(found, kReach_m, [&](const LibraryObject& other) {
+    if (other.class_id != found.class_id || other.expected_box.size_m.isZero() ||
+        other.frames_seen_through > 0) {
+      return false;
     }
-    OrientedBox room = other->expected_box;
+    OrientedBox room = other.expected_box;
     room.size_m += Eigen::Vector3d::Constant(2.0 * margin_m);
-    if (box_overlap(found.box, room, margin_m) >= kInsideShare &&
-        fits_inside(found.box, other->expected_box, like_size_slack_m())) {
-      return other;
-    }
-  }
-  return nullptr;
+    return box_overlap(found.box, room, margin_m) >= kInsideShare &&
+           fits_inside(found.box, other.expected_box, like_size_slack_m());
+  });
 }
 
 void ObjectTracker::take_rest(Step& step, LibraryObject& moved) {
@@ -113,22 +109,17 @@ void ObjectTracker::take_rest(Step& step, LibraryObject& moved) {
   }
 }
 
-bool ObjectTracker::may_be_part(const Step& step, const LibraryObject& found) const {
+bool ObjectTracker::may_be_part(const Step& step, const LibraryObject& found) {
   if (!config_.state.explain_new || !found.cut) return false;
   const double margin_m = config_.state.least_depth_m;
   OrientedBox around = found.box;
   around.size_m += Eigen::Vector3d(2.0 * margin_m, 2.0 * margin_m, 0.0);
-  for (const ObjectId id : library_.near(around.pose.position_W, around.size_m.norm())) {
-    const LibraryObject* other = library_.find(id);
-    if (id != found.id && other->confirmed && other->class_id == found.class_id &&
-        other->first_seen_ns < found.first_seen_ns && other->verified_ns < found.first_seen_ns &&
-        box_overlap(around, other->box, margin_m) > 0.0 &&
-        fits_inside(found.box, filled(other->box, step.cloud.T_W_C.translation(), margin_m),
-                    like_size_slack_m())) {
-      return true;
-    }
-  }
-  return false;
+  return first_known(found, around.size_m.norm(), [&](const LibraryObject& other) {
+    return other.class_id == found.class_id && unseen_since(other, found) &&
+           box_overlap(around, other.box, margin_m) > 0.0 &&
+           fits_inside(found.box, filled(other.box, step.cloud.T_W_C.translation(), margin_m),
+                       like_size_slack_m());
+  });
 }
 
 bool ObjectTracker::takes_place_of(const Step& step, const LibraryObject& found,
@@ -218,8 +209,7 @@ std::optional<ObjectTracker::Origin> ObjectTracker::origin_of(const Step& step,
   for (const ObjectId id : library_.near(here_W, state.relocation_reach_m)) {
     LibraryObject* other = library_.find(id);
     if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
-        other->first_seen_ns >= found.first_seen_ns || other->verified_ns >= found.first_seen_ns ||
-        !may_be(step, found, known_box(*other))) {
+        !unseen_since(*other, found) || !may_be(step, found, known_box(*other))) {
       continue;
     }
     const bool contested = other->contested_ns >= found.first_seen_ns;

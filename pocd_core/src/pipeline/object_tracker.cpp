@@ -186,8 +186,9 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   step.map.clear_object(object.id);
   refit_box(step, object);
   mark_changed(object);
-  step.evidence[object.id] = apply_measurement(object, moved->sign * moved->displacement_m,
-                                               sighting, config_.state, config_.change);
+  step.evidence[object.id] =
+      apply_measurement(object, moved->sign * moved->displacement_m,
+                        measurement_sigma(step, object), sighting, config_.state, config_.change);
   // Change is measured from the new place on.
   step.evidence[object.id].after.mu = object.belief.mu = 0.0;
   object.moment = {};
@@ -232,9 +233,15 @@ bool ObjectTracker::measure(Step& step, LibraryObject& object, double delta_m,
   }
   moment.measured = true;
   moment.points = points;
-  step.evidence[object.id] =
-      apply_measurement(object, delta_m, sighting, config_.state, config_.change);
+  step.evidence[object.id] = apply_measurement(object, delta_m, measurement_sigma(step, object),
+                                               sighting, config_.state, config_.change);
   return true;
+}
+
+double ObjectTracker::measurement_sigma(const Step& step, const LibraryObject& object) const {
+  const double depth_m = (step.cloud.T_W_C.inverse() * object.centroid_W).z();
+  return std::hypot(config_.change.tau_m,
+                    config_.change.depth_noise_factor * config_.depth_noise.sigma(depth_m));
 }
 
 void ObjectTracker::update_unmatched(Step& step) {

@@ -47,6 +47,8 @@ class ObjectTracker {
   /// Puts the frame's measurement into the belief and into the step's evidence; false when another
   /// robot has told more of the object in this moment.
   bool measure(Step& step, LibraryObject& object, double delta_m, const Sighting& sighting);
+  /// Standard deviation of a change that is measured at the object's distance [m].
+  double measurement_sigma(const Step& step, const LibraryObject& object) const;
   /// An object that was moved or turned a little, too little to be seen through: true when it is
   /// found displaced (and moved, once that has lasted), so that the observation must not be fused
   /// as it is.
@@ -78,7 +80,10 @@ class ObjectTracker {
   /// A known object of another class in whose place a new one stands, so that it is gone; or null.
   LibraryObject* replaced_by(const Step& step, const LibraryObject& found);
   /// Whether a new one is seen only in part, beside a like one that may have moved.
-  bool may_be_part(const Step& step, const LibraryObject& found) const;
+  bool may_be_part(const Step& step, const LibraryObject& found);
+  /// The first known object within reach of the new one for which `test` holds; or null.
+  template <class Test>
+  LibraryObject* first_known(const LibraryObject& found, double reach_m, const Test& test);
   /// Tries to explain a new object by what is known: as a part of it, or as what moved into the
   /// place of something. True when that was done; `found` may be gone then.
   bool explain(Step& step, LibraryObject& found);

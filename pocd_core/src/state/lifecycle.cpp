@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pocd/state/bayesian_update.hpp"
-
 namespace pocd {
 namespace {
 
@@ -21,9 +19,8 @@ Eigen::Vector3d sorted_size(const OrientedBox& box) {
 
 }  // namespace
 
-Belief next_belief(const Belief& before, double delta_m, int stationarity_class, double k,
-                   const StateConfig& state, const ChangeConfig& change) {
-  const Measurement measurement{delta_m, stationarity_class, change.tau_m, k};
+Belief next_belief(const Belief& before, const Measurement& measurement, const StateConfig& state,
+                   const ChangeConfig& change) {
   Belief after = bayesian_update(before, measurement, change.delta_max_m).belief;
   if (after.stationarity() > state.max_stationarity) return before;
   after = clamp_counts(after, state.max_count);
@@ -31,23 +28,23 @@ Belief next_belief(const Belief& before, double delta_m, int stationarity_class,
   return after;
 }
 
-Evidence apply_measurement(LibraryObject& object, double delta_m, const Sighting& sighting,
-                           const StateConfig& state, const ChangeConfig& change) {
+Evidence apply_measurement(LibraryObject& object, double delta_m, double sigma_m,
+                           const Sighting& sighting, const StateConfig& state,
+                           const ChangeConfig& change) {
   Evidence evidence;
   evidence.delta_m = std::clamp(delta_m, -change.delta_max_m, change.delta_max_m);
   evidence.stationarity_class = object.stationarity_class;
-  evidence.measurement_sigma_m = change.tau_m;
+  evidence.measurement_sigma_m = sigma_m;
   evidence.visible_share = sighting.visible_share();
   evidence.seen_through_share = sighting.seen_through_share();
   evidence.before = object.belief;
-  Measurement measurement{evidence.delta_m, object.stationarity_class, change.tau_m, 0.0};
+  Measurement measurement{evidence.delta_m, object.stationarity_class, sigma_m, 0.0};
   measurement.k = adaptive_k(object.belief, measurement, change.delta_max_m, state.k);
   evidence.k = measurement.k;
   const UpdateResult update = bayesian_update(object.belief, measurement, change.delta_max_m);
   evidence.c1 = update.c1;
   evidence.c2 = update.c2;
-  object.belief = next_belief(object.belief, evidence.delta_m, object.stationarity_class,
-                              evidence.k, state, change);
+  object.belief = next_belief(object.belief, measurement, state, change);
   evidence.after = object.belief;
   return evidence;
 }

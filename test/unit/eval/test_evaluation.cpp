@@ -96,6 +96,19 @@ TEST(Evaluation, NothingIsRemovedOrMovedWhereNothingChanges) {
   EXPECT_GT(run.methods[0].by_truth->precision(), 97.0);
 }
 
+// Shifts across, along and away from the view; a move behind something that leaves later.
+TEST(Evaluation, ShiftsAndMovesBehindAScreenAreToldAsTheyAre) {
+  const PipelineConfig config = simulated_config();
+  for (const char* name : {"shifted.yaml", "hidden_move.yaml"}) {
+    const RunScore run = evaluate(load_run({kSource / "config/sim" / name}),
+                                  {{"pocd", [=] { return make_pocd_method(config); }}}, 1);
+    const ObjectScore& score = *run.methods[0].objects;
+    EXPECT_EQ(score.changes.size(), 3u) << name;
+    EXPECT_DOUBLE_EQ(score.f1(), 1.0) << name;
+    EXPECT_EQ(score.false_changes, 0u) << name;
+  }
+}
+
 TEST(Evaluation, WithoutTruthOnlyTheReferenceIsThere) {
   const PipelineConfig config = simulated_config();
   const Scenario scenario = hall(true);

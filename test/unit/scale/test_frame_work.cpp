@@ -81,32 +81,5 @@ TEST(FrameWork, DoesNotGrowWithTheMap) {
   EXPECT_LE(static_cast<double>(many.tiles), kSlack * static_cast<double>(one.tiles));
 }
 
-TEST(FrameWork, SearchForANearerObjectEndsAtTheFirst) {
-  ObjectLibrary library;
-  const auto put = [&](double x, double y) {
-    OrientedBox box;
-    box.pose.position_W = {x, y, 0.5};
-    box.size_m = {0.5, 0.5, 0.5};
-    library.place(library.create(0.05), box);
-  };
-  for (int y = 0; y < 40; ++y) {
-    for (int x = 0; x < 40; ++x) put(5.0 * x, 5.0 * y);
-  }
-  const Eigen::Vector3d center(100.0, 100.0, 0.0);
-  const std::uint64_t before = library.visits();
-  EXPECT_TRUE(library.any_near(center, 500.0, [](const LibraryObject&) { return true; }));
-  EXPECT_LT(library.visits() - before, 30u);
-  // It finds what near() finds, wherever that is.
-  for (const ObjectId id : {ObjectId{1}, ObjectId{821}, ObjectId{1600}}) {
-    const auto is_it = [&](const LibraryObject& o) { return o.id == id; };
-    for (const double radius_m : {0.1, 7.0, 90.0, 145.0}) {
-      const double distance = (library.find(id)->box.pose.position_W - center).head<2>().norm();
-      const bool found = library.any_near(center, radius_m, is_it);
-      EXPECT_TRUE(found || distance > radius_m);
-      EXPECT_FALSE(found && distance > radius_m + 4.0);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace pocd::test

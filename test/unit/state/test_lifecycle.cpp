@@ -49,9 +49,11 @@ TEST(ApplyMeasurement, EvidenceAloneGivesTheBeliefAfterIt) {
     LibraryObject object = known_object(static_cast<int>(random.below(2)));
     object.belief = random_belief(random);
     const double delta_m = random.uniform(-1.2, 1.2) * kChange.delta_max_m * (i % 2 ? 1.0 : 0.05);
-    const Evidence e = apply_measurement(object, delta_m, {}, kState, kChange);
-    const Belief again =
-        next_belief(e.before, e.delta_m, e.stationarity_class, e.k, kState, kChange);
+    const double sigma_m = random.uniform(0.1, 0.4);
+    const Evidence e = apply_measurement(object, delta_m, sigma_m, {}, kState, kChange);
+    const Belief again = next_belief(
+        e.before, {e.delta_m, e.stationarity_class, e.measurement_sigma_m, e.k}, kState, kChange);
+    ASSERT_EQ(e.measurement_sigma_m, sigma_m);
     ASSERT_EQ(again.mu, e.after.mu);
     ASSERT_EQ(again.sigma, e.after.sigma);
     ASSERT_EQ(again.alpha, e.after.alpha);
@@ -68,11 +70,11 @@ TEST(ApplyMeasurement, EvidenceSaysHowMuchWasSeen) {
   s.hit = 30;
   s.seen_through = 10;
   LibraryObject object = known_object(1);
-  const Evidence e = apply_measurement(object, 0.01, s, kState, kChange);
+  const Evidence e = apply_measurement(object, 0.01, 0.23, s, kState, kChange);
   EXPECT_EQ(e.visible_share, 0.4);
   EXPECT_EQ(e.seen_through_share, 0.25);
   EXPECT_EQ(e.stationarity_class, 1);
-  EXPECT_EQ(e.measurement_sigma_m, kChange.tau_m);
+  EXPECT_EQ(e.measurement_sigma_m, 0.23);
   EXPECT_TRUE(e.rule.empty());
 }
 
@@ -81,7 +83,7 @@ TEST(ApplyMeasurement, KFollowsClassAndKind) {
     for (const double delta_m : {0.0, kChange.delta_max_m}) {
       LibraryObject object = known_object(s);
       const bool inlier = delta_m == 0.0;
-      EXPECT_EQ(apply_measurement(object, delta_m, {}, kState, kChange).k,
+      EXPECT_EQ(apply_measurement(object, delta_m, kChange.tau_m, {}, kState, kChange).k,
                 inlier == (s == 1) ? kState.k : 0.0);
     }
   }
@@ -97,7 +99,7 @@ TEST(NextBelief, IsTheBayesianStepWithItsBounds) {
     const double delta_m = random.uniform(-0.3, 0.3);
     const Belief plain =
         bayesian_update(before, {delta_m, s, kChange.tau_m, k}, kChange.delta_max_m).belief;
-    const Belief after = next_belief(before, delta_m, s, k, kState, kChange);
+    const Belief after = next_belief(before, {delta_m, s, kChange.tau_m, k}, kState, kChange);
     ASSERT_LE(after.alpha + after.beta, kState.max_count * (1 + 1e-12));
     ASSERT_GE(after.sigma, kState.min_sigma_share * kChange.tau_m);
     ASSERT_NEAR(after.stationarity(), plain.stationarity(), 1e-12) << "the cap keeps E[v]";
@@ -111,14 +113,31 @@ TEST(NextBelief, UpdateAboveVMaxIsNotApplied) {
   StateConfig state;
   state.max_stationarity = 0.9;
   const Belief before{0.02, 0.15, 8.9, 1.1};
-  const Belief after = next_belief(before, 0.0, 1, 3.0, state, kChange);
+  const Belief after = next_belief(before, {0.0, 1, kChange.tau_m, 3.0}, state, kChange);
   EXPECT_EQ(after.alpha, before.alpha);
   EXPECT_EQ(after.beta, before.beta);
   EXPECT_EQ(after.mu, before.mu);
   EXPECT_EQ(after.sigma, before.sigma);
   // What lowers it is applied from there all the same.
-  EXPECT_LT(next_belief(before, kChange.delta_max_m, 0, 3.0, state, kChange).stationarity(),
+  EXPECT_LT(next_belief(before, {kChange.delta_max_m, 0, kChange.tau_m, 3.0}, state, kChange)
+                .stationarity(),
             before.stationarity());
+}
+
+TEST(Boxes, HideWhatLiesBehindThem) {
+  const OrientedBox box = box_of(2.0, 0.0, {0.4, 1.0, 1.0});
+  const double z = box.pose.position_W.z();
+  const Eigen::Vector3d eye_W(0.0, 0.0, z);
+  EXPECT_TRUE(hides(box, eye_W, {4.0, 0.0, z}));
+  EXPECT_TRUE(hides(box, eye_W, {2.0, 0.0, z})) << "within";
+  EXPECT_FALSE(hides(box, eye_W, {1.5, 0.0, z})) << "before it";
+  EXPECT_FALSE(hides(box, eye_W, {4.0, 2.0, z})) << "beside it";
+  EXPECT_FALSE(hides(box, eye_W, {4.0, 0.0, z + 2.0})) << "above it";
+  EXPECT_FALSE(hides(box, eye_W, {-4.0, 0.0, z})) << "behind the eye";
+  OrientedBox turned = box;
+  turned.pose.yaw_rad = 0.5 * M_PI;
+  EXPECT_TRUE(hides(box, eye_W, {4.0, 0.8, z}));
+  EXPECT_FALSE(hides(turned, eye_W, {4.0, 0.8, z})) << "its end is narrow";
 }
 
 TEST(RemovalRule, NoneForAHealthyObject) {

@@ -15,6 +15,7 @@ struct AssociationConfig {
   double min_visible_share = 0.20;
   bool occlusion_aware = true;
   bool realign_displaced = true;
+  bool grow_by_pieces = true;
   int icp_points = 600;
   int icp_iterations = 30;
   double icp_max_distance_m = 0.5;
@@ -44,6 +45,9 @@ struct AssociationConfig {
     visit("realign_displaced", realign_displaced,
           "Align a known object anew where much of what is seen of it is off; false: such an "
           "observation is judged by the measured change alone, as published.");
+    visit("grow_by_pieces", grow_by_pieces,
+          "A second observation that fits a known object in part is another piece of it; false: it "
+          "becomes an object of its own, as published.");
     visit("icp_points", icp_points, Range{20, 100000}, "Points of an observation used by ICP.");
     visit("icp_iterations", icp_iterations, Range{1, 200}, "Iterations of ICP.");
     visit("icp_max_distance_m", icp_max_distance_m, Range{0.001, 10.0},

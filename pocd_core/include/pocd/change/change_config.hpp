@@ -12,6 +12,7 @@ struct ChangeConfig {
   double lambda_diff = 1.6;
   double delta_max_m = 4.0;
   double tau_m = 0.20;
+  double depth_noise_factor = 0.0;
   double pose_tolerance_m = 0.03;
   double tsdf_truncation_m = 0.8;
 
@@ -27,6 +28,10 @@ struct ChangeConfig {
     visit(
         "tau_m", tau_m, Range{0.001, 10.0},
         "Standard deviation of a measured change; changes up to half of it verify an object [m].");
+    visit(
+        "depth_noise_factor", depth_noise_factor, Range{0.0, 100.0},
+        "Adds so many times the depth noise at the object's distance to that deviation, as a root "
+        "of squares; 0: it is the same at every distance, as published.");
     visit("pose_tolerance_m", pose_tolerance_m, Range{0.0, 1.0},
           "Sideways error of poses: rays that pass nearer to a closer surface see through nothing "
           "[m].");

@@ -1,7 +1,6 @@
 // The objects the system believes in, and those it is about to.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -89,10 +88,6 @@ class ObjectLibrary {
 
   /// Ids of objects whose box may lie within `radius_m` of `center_W` (horizontally), ascending.
   std::vector<ObjectId> near(const Eigen::Vector3d& center_W, double radius_m) const;
-  /// Whether `test` holds for one of them. Looks from the centre outwards and no further than it
-  /// must: with objects all over the place, that is not far.
-  bool any_near(const Eigen::Vector3d& center_W, double radius_m,
-                const std::function<bool(const LibraryObject&)>& test) const;
 
   std::size_t size() const { return objects_.size(); }
   const std::map<ObjectId, std::unique_ptr<LibraryObject>>& all() const {
