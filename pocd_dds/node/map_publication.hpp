@@ -60,6 +60,7 @@ class MapPublication {
   };
 
   const NodeFile config_;
+  const std::uint32_t map_id_;
   MapPublisher publisher_;
   Writer<pocd_msgs::msg::MapTilePubSubType> tiles_;
   Writer<pocd_msgs::msg::MapDeltaPubSubType> deltas_;

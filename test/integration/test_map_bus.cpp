@@ -86,9 +86,9 @@ TEST(MapBus, TwoHundredLateJoinersConverge) {
   EXPECT_EQ(gathered_by_snapshot, 0u);
 }
 
-// A step of a third of a megabyte, and its tiles, leave at 0.3 MB/s. What is written when its first tile has arrived comes
-// before its last one: an event, because events do not wait for map data, and the delta of the next
-// step, because deltas go before tiles.
+// A step of a third of a megabyte, and its tiles, leave at 0.3 MB/s. What is written when its first
+// tile has arrived comes before its last one: an event, because events do not wait for map data,
+// and the delta of the next step, because deltas go before tiles.
 TEST(MapBus, EventsAndDeltasOvertakeTheTiles) {
   const TestDomain domain;
   MapSource source(domain, 5, 0.3);
