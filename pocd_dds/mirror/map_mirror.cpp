@@ -53,7 +53,6 @@ struct MapMirror::Impl {
         participant(dds::shared_participant({given.domain, given.profiles_file, given.name})),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         deltas(participant, dds::topics::kMapDeltas, wakeup),
-        replies(participant, dds::topics::kSnapshotReply, wakeup),
         object_states(participant, dds::topics::kObjects, wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
@@ -89,12 +88,12 @@ struct MapMirror::Impl {
   std::shared_ptr<dds::Participant> participant;
   dds::Reader<msg::MapManifestPubSubType> manifests;
   dds::Reader<msg::MapDeltaPubSubType> deltas;
-  dds::Reader<msg::MapSnapshotReplyPubSubType> replies;
   dds::Reader<msg::ObjectStatePubSubType> object_states;
   dds::Reader<msg::ObjectEventPubSubType> events;
   dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
 
-  // Only while tiles are gathered; by the thread.
+  // Only while snapshots are waited for, or tiles are gathered; by the thread.
+  std::unique_ptr<dds::Reader<msg::MapSnapshotReplyPubSubType>> replies;
   std::unique_ptr<dds::Reader<msg::MapTilePubSubType>> tiles;
   std::map<std::array<std::uint8_t, 16>, std::uint64_t> epoch_of_writer;
   std::map<std::array<std::uint8_t, 16>, TileKey> tile_of_instance;
@@ -195,9 +194,10 @@ void MapMirror::Impl::take_deltas() {
 }
 
 void MapMirror::Impl::take_replies() {
+  if (!replies) return;
   msg::MapSnapshotReply message;
   dds::SampleMeta meta;
-  while (replies.take(message, meta)) {
+  while (replies->take(message, meta)) {
     if (!meta.valid || !ours(message)) continue;
     // Others ask, too: what this copy has no use for is not kept.
     if (!follower.needs(dds::snapshot_header(message))) continue;
@@ -246,7 +246,13 @@ void MapMirror::Impl::catch_up() {
   if (at != last_at) plan.progress(Clock::now());
   last_at = at;
   const bool stale = manifest && !follower.current() && publishers.present();
-  const auto wish = plan.next(Clock::now(), {stale, follower.has_base(), requests.matched() > 0});
+  const bool hears = replies && replies->matched() > 0;
+  const auto wish = plan.next(Clock::now(), {stale, requests.matched() > 0, hears});
+  if (!wish.listen) replies.reset();
+  if (wish.listen && !replies) {
+    replies = std::make_unique<dds::Reader<msg::MapSnapshotReplyPubSubType>>(
+        participant, dds::topics::kSnapshotReply, wakeup);
+  }
   if (tiles && (!wish.gather || wish.restart)) {
     tiles.reset();
     follower.stop_gathering();

@@ -7,8 +7,9 @@
 namespace pocd::dds {
 namespace {
 
-// Small enough that losing one costs little, large enough that a frame's change is a few messages.
-constexpr std::size_t kPartBytes = 256 * 1024;
+// Small enough that what else is sent does not wait long, large enough that a frame's change is a
+// few messages.
+constexpr std::size_t kPartBytes = 64 * 1024;
 constexpr std::chrono::seconds kLongestReply{5};
 constexpr std::chrono::milliseconds kTurn{5};
 
@@ -138,8 +139,14 @@ void MapPublication::answer_requests() {
     const bool same_run = request.epoch() == publisher_.epoch();
     const std::uint64_t held = same_run ? std::min(request.version(), publisher_.version()) : 0;
     wanted_ = wanted_ ? std::min(*wanted_, held) : held;
+    asked_ = std::chrono::steady_clock::now();
   }
   if (!wanted_ || !replies_waiting_.empty()) return;
+  // Who asks has a reader of replies; this side may hear of it later, or it has gone again.
+  if (replies_.matched() == 0) {
+    if (std::chrono::steady_clock::now() - asked_ >= kLongestReply) wanted_.reset();
+    return;
+  }
   // A reply goes to all who listen. As long as one is under way, more who ask wait for the next one
   // together; but not for ever for one who has died.
   if (!replies_.wait_acknowledged(std::chrono::milliseconds(0)) &&
@@ -167,7 +174,7 @@ bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {
   for (;; std::this_thread::sleep_for(kTurn)) {
     answer_requests();
     send_waiting();
-    if (waiting() == 0 && !wanted_) break;
+    if (waiting() == 0 && (!wanted_ || replies_.matched() == 0)) break;
     if (std::chrono::steady_clock::now() >= end) return false;
   }
   return deltas_.wait_acknowledged(time) && tiles_.wait_acknowledged(time) &&

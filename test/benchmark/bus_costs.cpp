@@ -16,8 +16,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double kLongestMatch_s = 150.0;
+
 struct Options {
-  double area_m2 = 10000.0, rate_mb_s = 10.0, seconds = 20.0, link_mbit = 0.0;
+  double area_m2 = 10000.0, rate_mb_s = 10.0, object_period_s = 0.1, lease_s = 5.0;
+  double seconds = 20.0, link_mbit = 0.0;
   int robots = 100, processes = 4, domain = 90;
 };
 
@@ -52,35 +55,35 @@ class Run {
     write_udp_profiles(folder_.path() / "udp.xml");
     config_.pipeline = scale_config();
     config_.node.map_rate_mb_s = options.rate_mb_s;
+    config_.node.object_period_s = options.object_period_s;
     const auto halls = std::max(1L, std::lround(options.area_m2 / kHallArea_m2));
     site_.emplace(config_.pipeline, static_cast<int>(halls), drive_through_hall(0.8, 5));
-    load_ = drive_load(*site_, config_.node.map_period_s);
+    load_ = drive_load(*site_, config_.node.map_period_s, 0.1);
   }
 
   void run() {
     map();
     late_joiners();
-    fleet();
+    if (options_.robots > 0) fleet();
   }
 
  private:
   MemberOptions member(const std::string& kind, int participants = 1) const {
-    return {options_.domain, (folder_.path() / "udp.xml").string(), kind, participants};
+    return {options_.domain, (folder_.path() / "udp.xml").string(), kind, participants,
+            options_.lease_s};
   }
   void serve_for(double seconds, int robots) {
     const auto start = Clock::now();
     publisher_->serve([&] { return since(start) >= seconds; }, load_, robots);
   }
   /// Until all of these have found the component, and it them.
-  void serve_until_ready(std::vector<Member*> members) {
-    publisher_->serve(
-        [&] {
-          for (Member* m : members) {
-            if (!m->ready()) return false;
-          }
-          return true;
-        },
-        load_, 0);
+  void serve_until_ready(const std::vector<Member*>& members) {
+    const auto start = Clock::now();
+    const auto ready = [&] {
+      return std::all_of(members.begin(), members.end(), [](Member* m) { return m->ready(); });
+    };
+    publisher_->serve([&] { return ready() || since(start) > kLongestMatch_s; }, load_, 0);
+    if (!ready()) throw std::runtime_error("listeners and component did not find each other");
   }
 
   void map() {
@@ -236,6 +239,12 @@ int main(int argc, char** argv) {
   app.add_option("--processes", options.processes, "Processes that the robots are in")
       ->capture_default_str();
   app.add_option("--rate", options.rate_mb_s, "node.map_rate_mb_s [MB/s]")->capture_default_str();
+  app.add_option("--object-period", options.object_period_s, "node.object_period_s [s]")
+      ->capture_default_str();
+  app.add_option(
+         "--lease", options.lease_s,
+         "Lease of all participants; a fifth of it is the period of their signs of life [s]")
+      ->capture_default_str();
   app.add_option("--link", options.link_mbit, "Capacity of the network [Mbit/s]; 0: no limit")
       ->capture_default_str();
   app.add_option("--seconds", options.seconds, "How long the fleet is measured")
@@ -245,6 +254,7 @@ int main(int argc, char** argv) {
   listen->add_option("--profiles", member.profiles);
   listen->add_option("--kind", member.kind);
   listen->add_option("--participants", member.participants);
+  listen->add_option("--lease", member.lease_s);
   CLI11_PARSE(app, argc, argv);
   try {
     if (listen->parsed()) return run_member(member);

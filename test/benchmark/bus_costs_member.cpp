@@ -18,7 +18,6 @@
 #include "pocd_dds/map_mirror.hpp"
 #include "pocd_msgsPubSubTypes.h"
 #include "rmf_obstacle_msgsPubSubTypes.h"
-#include "sensor_msgsPubSubTypes.h"
 #include "statistics.hpp"
 #include "visualization_msgsPubSubTypes.h"
 
@@ -40,9 +39,7 @@ StampNs now_ns() {
 class Listener {
  public:
   Listener(const MemberOptions& options, bool everything, dds::Wakeup& wakeup)
-      : bus_(std::make_shared<dds::Participant>(
-            dds::BusOptions{options.domain, options.profiles, "member"})),
-        wakeup_(wakeup) {
+      : bus_(std::make_shared<dds::Participant>(bus_options(options))), wakeup_(wakeup) {
     read<ObjectStatePubSubType>(dds::topics::kObjects, [this](const ObjectState& state) {
       // What was there before belongs to the history that one who joins gets.
       const StampNs sent_ns = dds::to_stamp(state.header().stamp());
@@ -58,7 +55,6 @@ class Listener {
     read<visualization_msgs::msg::MarkerArrayPubSubType>(dds::topics::kMarkers);
     read<nav_msgs::msg::OccupancyGridPubSubType>(dds::topics::kOccupancy);
     read<map_msgs::msg::OccupancyGridUpdatePubSubType>(dds::topics::kOccupancyUpdates);
-    read<sensor_msgs::msg::PointCloud2PubSubType>(dds::topics::kSurface);
     read<rmf_obstacle_msgs::msg::ObstaclesPubSubType>(dds::topics::kRmfObstacles);
   }
 
@@ -169,6 +165,12 @@ int mirror(const MemberOptions& options) {
 
 }  // namespace
 
+dds::BusOptions bus_options(const MemberOptions& options) {
+  dds::BusOptions bus{options.domain, options.profiles, "pocd_bus_costs"};
+  bus.lease_s = options.lease_s;
+  return bus;
+}
+
 int run_member(const MemberOptions& options) {
   const auto stop = [](int) { stopping = true; };
   std::signal(SIGTERM, stop);
@@ -187,7 +189,8 @@ int run_member(const MemberOptions& options) {
 Member::Member(const MemberOptions& options)
     : process_({std::filesystem::read_symlink("/proc/self/exe").string(), "member", "--domain",
                 std::to_string(options.domain), "--profiles", options.profiles, "--kind",
-                options.kind, "--participants", std::to_string(options.participants)}) {}
+                options.kind, "--participants", std::to_string(options.participants), "--lease",
+                std::to_string(options.lease_s)}) {}
 
 MemberReport Member::finish() {
   process_.signal(SIGTERM);

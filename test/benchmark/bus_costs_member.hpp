@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bus_costs_network.hpp"
+#include "pocd_dds/entities/participant.hpp"
 #include "run_command.hpp"
 
 namespace pocd::benchmark {
@@ -14,11 +15,13 @@ namespace pocd::benchmark {
 struct MemberOptions {
   int domain = 0;
   std::string profiles;
-  /// robot: objects, events and health; everything: all topics; tiles, snapshot: a mirror that ends
-  /// when it is in step; follow: a mirror that goes on
+  /// robot: objects, events and health; everything: all topics but the surface; tiles, snapshot: a
+  /// mirror that ends when it is in step; follow: a mirror that goes on
   std::string kind = "robot";
   int participants = 1;
+  double lease_s = 5.0;
 };
+dds::BusOptions bus_options(const MemberOptions& options);
 
 /// The process that Member starts: listens until it gets SIGTERM, then writes its report; SIGUSR1
 /// begins a new one.

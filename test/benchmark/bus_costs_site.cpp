@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <set>
+#include <thread>
 
 #include "pocd_dds/node/intake.hpp"
 
@@ -11,7 +12,7 @@ namespace {
 constexpr std::uint64_t kEpoch = 1;
 constexpr double kSpeed_mps = 1.2, kFrameRate_hz = 15.0;
 constexpr std::chrono::milliseconds kTurn{5};
-constexpr double kTick_s = 0.1;
+constexpr std::chrono::milliseconds kTick{33};
 
 double seconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double>(time).count();
@@ -28,10 +29,11 @@ void touch_all(TsdfMap& map) {
 
 }  // namespace
 
-DriveLoad drive_load(Site& site, double map_period_s) {
+DriveLoad drive_load(Site& site, double map_period_s, double object_period_s) {
   const std::vector<Frame> drive = drive_through_hall(kSpeed_mps / kFrameRate_hz, 7);
   const auto frames_per_step = static_cast<std::size_t>(map_period_s * kFrameRate_hz);
-  const auto frames_per_tick = static_cast<std::size_t>(std::ceil(kTick_s * kFrameRate_hz));
+  const auto frames_per_round =
+      static_cast<std::size_t>(std::ceil(object_period_s * kFrameRate_hz));
   DriveLoad load;
   load.seconds = static_cast<double>(drive.size()) / kFrameRate_hz;
   TsdfMap& map = site.pipeline().map();
@@ -44,7 +46,7 @@ DriveLoad drive_load(Site& site, double map_period_s) {
     const FrameResult result = site.process(drive[i]);
     events += static_cast<double>(result.events.size());
     for (const ObjectSnapshot& object : result.changed_objects) changed.insert(object.id);
-    if (i % frames_per_tick == 0) states += static_cast<double>(changed.size()), changed.clear();
+    if (i % frames_per_round == 0) states += static_cast<double>(changed.size()), changed.clear();
     if ((i + 1) % frames_per_step != 0) continue;
     // Looked at before the publisher takes them.
     auto& step = load.steps.emplace_back();
@@ -85,13 +87,17 @@ void SitePublisher::publish_all() {
   objects_.send_due(true);
 }
 
-void SitePublisher::write_objects(double states, double events) {
+void SitePublisher::write_objects(const DriveLoad& load, int robots, double seconds) {
   FrameResult result;
   const StampNs now_ns = wall_ns();
-  for (states_due_ += states; states_due_ >= 1.0; states_due_ -= 1.0) {
-    result.changed_objects.push_back(snapshots_[random_.below(snapshots_.size())]);
+  for (states_due_ += load.states_per_s * robots * seconds; states_due_ >= 1.0; --states_due_) {
+    // What a robot looks at for some seconds.
+    const auto robot = random_.below(static_cast<std::uint64_t>(robots));
+    const auto seen =
+        robot * snapshots_.size() / static_cast<std::size_t>(robots) + random_.below(3);
+    result.changed_objects.push_back(snapshots_[seen % snapshots_.size()]);
   }
-  for (events_due_ += events; events_due_ >= 1.0; events_due_ -= 1.0) {
+  for (events_due_ += load.events_per_s * robots * seconds; events_due_ >= 1.0; --events_due_) {
     const ObjectSnapshot& object = snapshots_[random_.below(snapshots_.size())];
     ObjectEvent event;
     event.sequence = ++events_;
@@ -106,7 +112,7 @@ void SitePublisher::write_objects(double states, double events) {
     result.events.push_back(event);
   }
   objects_.add(result, now_ns);
-  objects_.send_due(true);
+  objects_.send_due(false);
 }
 
 void SitePublisher::change_map(const DriveLoad& load, int robots) {
@@ -141,29 +147,41 @@ void SitePublisher::send_status(int robots) {
   status_.send(input, work, 0, 0, "running", wall_ns());
 }
 
+void SitePublisher::work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots) {
+  auto ticked = Clock::now(), stepped = ticked;
+  while (!stopping) {
+    std::this_thread::sleep_for(kTick);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto now = Clock::now();
+    write_objects(load, robots, seconds(now - ticked));
+    ticked = now;
+    if (seconds(now - stepped) < config_.node.map_period_s || map_.waiting() > 0) continue;
+    stepped = now;
+    change_map(load, robots);
+    map_.send_due(site_.pipeline().map(), wall_ns(), true);
+  }
+}
+
 void SitePublisher::serve(const std::function<bool()>& done, const DriveLoad& load, int robots) {
-  const auto start = Clock::now();
-  double ticked_s = 0.0, stepped_s = 0.0, told_s = -1.0;
+  std::atomic<bool> stopping{false};
+  std::thread worker;
+  if (robots > 0) worker = std::thread([&] { work(stopping, load, robots); });
+  auto told = Clock::time_point{};
   while (!done()) {
     wakeup_.wait_for(kTurn);
-    map_.answer_requests();
-    map_.send_waiting();
-    const double now_s = seconds(Clock::now() - start);
-    if (now_s - ticked_s >= kTick_s) {
-      const double passed = now_s - ticked_s;
-      ticked_s = now_s;
-      write_objects(load.states_per_s * robots * passed, load.events_per_s * robots * passed);
+    const StampNs now_ns = wall_ns();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      map_.answer_requests();
+      map_.send_waiting();
+      if (seconds(Clock::now() - told) >= 1.0) told = Clock::now(), send_status(robots);
+      outputs_.collect({objects_.objects(), objects_.touched()},
+                       {map_.publisher().tiles(), map_.changed()}, now_ns, now_ns, false);
     }
-    if (now_s - stepped_s >= config_.node.map_period_s && map_.waiting() == 0) {
-      stepped_s = now_s;
-      change_map(load, robots);
-      map_.send_due(site_.pipeline().map(), wall_ns(), true);
-    }
-    if (now_s - told_s >= 1.0) told_s = now_s, send_status(robots);
-    outputs_.collect({objects_.objects(), objects_.touched()},
-                     {map_.publisher().tiles(), map_.changed()}, wall_ns(), wall_ns(), false);
     outputs_.send();
   }
+  stopping = true;
+  if (worker.joinable()) worker.join();
 }
 
 }  // namespace pocd::benchmark

@@ -1,9 +1,11 @@
 // A large map with what the robots in it change, published by the component's own code.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -25,9 +27,10 @@ struct DriveLoad {
   double states_per_s = 0.0, events_per_s = 0.0;
 };
 /// Drives through the first hall of the site at 1.2 m/s, 15 frames per second of data time.
-DriveLoad drive_load(Site& site, double map_period_s);
+DriveLoad drive_load(Site& site, double map_period_s, double object_period_s);
 
-/// The component without its pipeline: publishes the site's map and objects.
+/// The component without its pipeline: publishes the site's map and objects, as Node does by a
+/// thread that writes what is new and one for the rest.
 class SitePublisher {
  public:
   SitePublisher(Site& site, const dds::NodeFile& config, const dds::BusOptions& bus);
@@ -43,7 +46,8 @@ class SitePublisher {
 
  private:
   using Clock = std::chrono::steady_clock;
-  void write_objects(double states, double events);
+  void work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots);
+  void write_objects(const DriveLoad& load, int robots, double seconds);
   void change_map(const DriveLoad& load, int robots);
   void send_status(int robots);
 
@@ -51,6 +55,7 @@ class SitePublisher {
   const dds::NodeFile config_;
   std::shared_ptr<dds::Participant> participant_;
   dds::Wakeup wakeup_;
+  std::mutex mutex_;  // what both threads use
   dds::ObjectPublication objects_;
   dds::MapPublication map_;
   dds::StatusPublication status_;
