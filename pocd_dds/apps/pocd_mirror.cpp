@@ -126,6 +126,8 @@ int main(int argc, char** argv) {
                  "How to get what was missed: from the tiles kept for late joiners, or by asking")
       ->transform(CLI::CheckedTransformer(means))
       ->option_text("either, tiles or snapshot; default: either");
+  app.add_option("--map-id", options.mirror.map_id, "Which map: node.map_id of its publisher")
+      ->capture_default_str();
   int domain = -1;
   pocd::dds::add_bus_options(app, domain, options.mirror.profiles_file);
   try {

@@ -168,13 +168,14 @@ std::array<std::uint8_t, 16> object_uuid(std::uint64_t epoch, ObjectId id) {
   return uuid;
 }
 
-pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, std::uint64_t epoch,
+pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, const MapRun& run,
                                            const ClassMap& classes, StampNs stamp_ns,
                                            const std::string& frame_id) {
   pocd_msgs::msg::ObjectState message;
-  message.uuid(object_uuid(epoch, object.id));
+  message.uuid(object_uuid(run.epoch, object.id));
   message.header(header_of(stamp_ns, frame_id));
-  message.epoch(epoch);
+  message.map_id(run.map_id);
+  message.epoch(run.epoch);
   message.local_id(to_index(object.id));
   message.class_id(object.class_id);
   message.class_name(classes.name(object.class_id));
@@ -206,14 +207,15 @@ ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message) {
   return object;
 }
 
-pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, std::uint64_t epoch,
+pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, const MapRun& run,
                                           const ClassMap& classes, const std::string& frame_id) {
   pocd_msgs::msg::ObjectEvent message;
   message.header(header_of(event.stamp_ns, frame_id));
-  message.epoch(epoch);
+  message.map_id(run.map_id);
+  message.epoch(run.epoch);
   message.seq(event.sequence);
   message.kind(static_cast<std::uint8_t>(event.kind));
-  message.uuid(object_uuid(epoch, event.object));
+  message.uuid(object_uuid(run.epoch, event.object));
   message.local_id(to_index(event.object));
   message.class_id(event.class_id);
   message.class_name(classes.name(event.class_id));
@@ -223,7 +225,7 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, std::uint64_
   message.has_previous_box(event.previous_box.has_value());
   if (event.previous_box) message.previous_box(box_of(*event.previous_box));
   if (event.absorbed) {
-    message.absorbed_uuid(object_uuid(epoch, *event.absorbed));
+    message.absorbed_uuid(object_uuid(run.epoch, *event.absorbed));
     message.absorbed_local_id(to_index(*event.absorbed));
   }
   pocd_msgs::msg::Evidence evidence;

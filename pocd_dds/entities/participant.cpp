@@ -32,6 +32,9 @@ constexpr std::uint32_t kSegmentBytes = 32u << 20;
 constexpr std::uint32_t kSocketBytes = 4u << 20;
 // Within a lease; one that is lost on the way does no harm.
 constexpr double kSignsOfLife = 5.0;
+// A domain has ports for participants 0 to 119 of a host (RTPS 2.2, 9.6.1.1). Fast DDS tries 100
+// and makes one that hears nobody when they are taken.
+constexpr std::uint32_t kLastOfAHost = 119;
 constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbers overflow
 
 // The name has to outlive every participant.
@@ -133,6 +136,8 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
     discovery.leaseDuration_announcementperiod =
         eprosima::fastrtps::Duration_t(options.lease_s / kSignsOfLife);
   }
+  auto& tries = qos.wire_protocol().builtin.mutation_tries;
+  if (tries == DomainParticipantQos().wire_protocol().builtin.mutation_tries) tries = kLastOfAHost;
   if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
   flow->name = kBackground;

@@ -8,6 +8,8 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <mutex>
+#include <set>
 
 #include "pocd/common/check.hpp"
 
@@ -23,11 +25,24 @@ struct RawReader::Impl : DataReaderListener {
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
   std::atomic<std::uint64_t> incompatible{0}, lost{0};
+  std::mutex mutex;
+  std::set<SampleMeta::Guid> writers;
 
   void on_data_available(DataReader*) override { wakeup->wake(); }
   void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
     matched = status.current_count;
     ever_matched = status.total_count;
+    {
+      SampleMeta::Guid guid{};
+      const eprosima::fastrtps::rtps::octet* bytes = status.last_publication_handle.value;
+      std::copy(bytes, bytes + guid.size(), guid.begin());
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (status.current_count_change > 0) {
+        writers.insert(guid);
+      } else {
+        writers.erase(guid);
+      }
+    }
     wakeup->wake();
   }
   void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
@@ -62,6 +77,10 @@ RawReader::~RawReader() {
 
 int RawReader::matched() const { return impl_->matched; }
 int RawReader::ever_matched() const { return impl_->ever_matched; }
+bool RawReader::has_writer(const SampleMeta::Guid& writer) const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->writers.count(writer) > 0;
+}
 std::uint64_t RawReader::incompatible() const { return impl_->incompatible; }
 std::uint64_t RawReader::lost() const { return impl_->lost; }
 

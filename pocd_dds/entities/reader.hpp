@@ -14,13 +14,14 @@ namespace pocd::dds {
 
 /// What came with a sample.
 struct SampleMeta {
+  using Guid = std::array<std::uint8_t, 16>;
   bool valid =
       true;  ///< false: the instance was disposed or lost its writers; no fields but the key
   bool disposed = false;
   /// Key of a keyed sample, as the instance handle has it; our keys are 16 bytes and fit as they
   /// are.
   std::array<std::uint8_t, 16> key{};
-  std::array<std::uint8_t, 16> writer{};  ///< GUID of the one who wrote
+  Guid writer{};  ///< of the one who wrote
 };
 
 /// What does not depend on the type. take() from one thread at a time; the rest is thread-safe.
@@ -38,6 +39,8 @@ class RawReader {
   /// Writers matched now, and ever.
   int matched() const;
   int ever_matched() const;
+  /// The writer with this GUID is matched now.
+  bool has_writer(const SampleMeta::Guid& writer) const;
   std::uint64_t incompatible() const;
   /// Samples that the bus says were lost on the way.
   std::uint64_t lost() const;

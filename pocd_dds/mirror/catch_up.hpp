@@ -16,13 +16,14 @@ class CatchUpPlan {
 
   struct State {
     bool stale = false;
-    bool has_base = false;  ///< a part of the map would be enough
-    bool can_ask = false;   ///< somebody hears requests for snapshots
+    bool can_ask = false;  ///< somebody hears requests for snapshots
+    bool hears = false;    ///< there is a reader of replies, and it has a writer
   };
   struct Wish {
+    bool listen = false;   ///< have a reader of replies
+    bool ask = false;      ///< send a request for a snapshot now
     bool gather = false;   ///< read the single tiles
     bool restart = false;  ///< from the beginning: what was read has led to nothing
-    bool ask = false;      ///< send a request for a snapshot now
   };
 
   explicit CatchUpPlan(CatchUp means) : means_(means) {}
@@ -33,19 +34,26 @@ class CatchUpPlan {
   Wish next(Time now, const State& state) {
     Wish wish;
     if (!state.stale) {
-      moved_.reset(), asked_.reset(), gathering_.reset();
+      moved_.reset(), asked_.reset(), gathering_.reset(), heard_.reset();
+      listening_ = false;
       return wish;
     }
     if (!moved_) moved_ = now;
     const auto still = now - *moved_;
     const bool stuck = still >= kGiveUp;
-    // One who has nothing gets each tile once and for himself alone; one who lacks a step gets just
-    // that by a snapshot.
-    const bool snapshot_first = means_ == CatchUp::kSnapshot ||
-                                (means_ == CatchUp::kEither && state.has_base && state.can_ask);
-    const bool may_ask = means_ != CatchUp::kTiles && (snapshot_first || stuck);
+    // Snapshots leave at the rate of map data. Tiles that the bus keeps come all at once, and what
+    // else the network carries waits behind them.
+    const bool snapshot_first =
+        means_ == CatchUp::kSnapshot || (means_ == CatchUp::kEither && state.can_ask);
+    const bool may_ask = means_ != CatchUp::kTiles && (snapshot_first || stuck) && state.can_ask;
     const bool may_gather = means_ != CatchUp::kSnapshot && (!snapshot_first || stuck);
-    if (may_ask && state.can_ask && still >= kPatience && (!asked_ || now - *asked_ >= kGiveUp)) {
+    // Only who lacks something listens: a reply goes to all who do.
+    listening_ = listening_ || (may_ask && still >= kPatience);
+    wish.listen = listening_;
+    if (!state.hears) heard_.reset();
+    if (state.hears && !heard_) heard_ = now;
+    if (may_ask && heard_ && now - *heard_ >= kMatched && still >= kPatience &&
+        (!asked_ || now - *asked_ >= kGiveUp)) {
       asked_ = now;
       wish.ask = true;
     }
@@ -61,11 +69,14 @@ class CatchUpPlan {
   // Deltas and manifest travel on different topics: what is behind for less than this is on its
   // way.
   static constexpr std::chrono::milliseconds kPatience{300};
+  // The publisher hears of a reader a moment after the reader of the publisher.
+  static constexpr std::chrono::milliseconds kMatched{100};
   static constexpr std::chrono::milliseconds kGiveUp{2000};
   static constexpr std::chrono::milliseconds kStartOver{6000};
 
   CatchUp means_;
-  std::optional<Time> moved_, asked_, gathering_;
+  std::optional<Time> moved_, asked_, gathering_, heard_;
+  bool listening_ = false;
 };
 
 }  // namespace pocd::dds

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -9,6 +10,8 @@
 
 #include "mirror/catch_up.hpp"
 #include "mirror/part_assembler.hpp"
+#include "mirror/publishers.hpp"
+#include "mirror/shared_participant.hpp"
 #include "pocd/map/map_follower.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/reader.hpp"
@@ -30,21 +33,15 @@ std::array<std::uint8_t, 16> random_id() {
   return id;
 }
 
-/// Mirrors of one process that ask for the same share it: a participant costs far more than its
-/// readers.
-std::shared_ptr<dds::Participant> shared_participant(const MirrorOptions& options) {
-  static std::mutex mutex;
-  static std::map<std::tuple<int, std::string, std::string>, std::weak_ptr<dds::Participant>> known;
-  const std::lock_guard<std::mutex> lock(mutex);
-  std::weak_ptr<dds::Participant>& entry =
-      known[{options.domain, options.profiles_file, options.name}];
-  std::shared_ptr<dds::Participant> participant = entry.lock();
-  if (!participant) {
-    participant = std::make_shared<dds::Participant>(
-        dds::BusOptions{options.domain, options.profiles_file, options.name});
-    entry = participant;
-  }
-  return participant;
+std::string conflict(std::uint32_t map_id, std::uint64_t followed,
+                     const std::vector<std::uint64_t>& rivals) {
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "map %u is published by %zu nodes at once, epochs %016llx (followed) and %016llx: "
+                "give each a node.map_id of its own",
+                map_id, rivals.size() + 1, static_cast<unsigned long long>(followed),
+                static_cast<unsigned long long>(rivals.front()));
+  return text;
 }
 
 }  // namespace
@@ -53,10 +50,9 @@ struct MapMirror::Impl {
   explicit Impl(const MirrorOptions& given)
       : options(given),
         id(random_id()),
-        participant(shared_participant(given)),
+        participant(dds::shared_participant({given.domain, given.profiles_file, given.name})),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         deltas(participant, dds::topics::kMapDeltas, wakeup),
-        replies(participant, dds::topics::kSnapshotReply, wakeup),
         object_states(participant, dds::topics::kObjects, wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
@@ -70,6 +66,11 @@ struct MapMirror::Impl {
   }
 
   void run();
+  /// Of this map, and not of a publisher beside the one that is followed.
+  template <class Message>
+  bool ours(const Message& message) const {
+    return message.map_id() == options.map_id && !publishers.foreign(message.epoch(), Clock::now());
+  }
   void take_objects();
   void take_events();
   void take_manifests();
@@ -87,12 +88,12 @@ struct MapMirror::Impl {
   std::shared_ptr<dds::Participant> participant;
   dds::Reader<msg::MapManifestPubSubType> manifests;
   dds::Reader<msg::MapDeltaPubSubType> deltas;
-  dds::Reader<msg::MapSnapshotReplyPubSubType> replies;
   dds::Reader<msg::ObjectStatePubSubType> object_states;
   dds::Reader<msg::ObjectEventPubSubType> events;
   dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
 
-  // Only while tiles are gathered; by the thread.
+  // Only while snapshots are waited for, or tiles are gathered; by the thread.
+  std::unique_ptr<dds::Reader<msg::MapSnapshotReplyPubSubType>> replies;
   std::unique_ptr<dds::Reader<msg::MapTilePubSubType>> tiles;
   std::map<std::array<std::uint8_t, 16>, std::uint64_t> epoch_of_writer;
   std::map<std::array<std::uint8_t, 16>, TileKey> tile_of_instance;
@@ -102,6 +103,7 @@ struct MapMirror::Impl {
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
   MapFollower follower;
+  dds::Publishers publishers;
   std::optional<msg::MapManifest> manifest;
   std::map<std::array<std::uint8_t, 16>, msg::ObjectState> objects;
   dds::PartAssembler<std::pair<std::uint64_t, std::uint64_t>, msg::MapDelta> delta_parts;
@@ -136,7 +138,7 @@ void MapMirror::Impl::take_objects() {
   dds::SampleMeta meta;
   while (object_states.take(state, meta)) {
     if (meta.valid) {
-      objects[state.uuid()] = state;
+      if (state.map_id() == options.map_id) objects[state.uuid()] = state;
     } else if (meta.disposed) {
       objects.erase(meta.key);
     }
@@ -153,7 +155,7 @@ void MapMirror::Impl::take_events() {
   msg::ObjectEvent message;
   dds::SampleMeta meta;
   while (events.take(message, meta)) {
-    if (meta.valid && options.on_event) {
+    if (meta.valid && options.on_event && message.map_id() == options.map_id) {
       options.on_event(dds::event_from(message), message.class_name());
     }
   }
@@ -164,17 +166,21 @@ void MapMirror::Impl::take_manifests() {
   dds::SampleMeta meta;
   while (manifests.take(message, meta)) {
     if (!meta.valid || message.map_id() != options.map_id) continue;
+    if (!publishers.heard(meta.writer, message.epoch(), message.final_version(), Clock::now())) {
+      continue;
+    }
     if (manifest && manifest->epoch() != message.epoch()) forget_objects_of(manifest->epoch());
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
   }
+  publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); });
 }
 
 void MapMirror::Impl::take_deltas() {
   msg::MapDelta message;
   dds::SampleMeta meta;
   while (deltas.take(message, meta)) {
-    if (!meta.valid || message.map_id() != options.map_id) continue;
+    if (!meta.valid || !ours(message)) continue;
     if (follower.follows(message.epoch(), message.base_version())) plan.progress(Clock::now());
     const auto parts = delta_parts.add({message.epoch(), message.version()}, message);
     if (!parts) continue;
@@ -188,10 +194,11 @@ void MapMirror::Impl::take_deltas() {
 }
 
 void MapMirror::Impl::take_replies() {
+  if (!replies) return;
   msg::MapSnapshotReply message;
   dds::SampleMeta meta;
-  while (replies.take(message, meta)) {
-    if (!meta.valid || message.map_id() != options.map_id) continue;
+  while (replies->take(message, meta)) {
+    if (!meta.valid || !ours(message)) continue;
     // Others ask, too: what this copy has no use for is not kept.
     if (!follower.needs(dds::snapshot_header(message))) continue;
     plan.progress(Clock::now());
@@ -215,7 +222,7 @@ void MapMirror::Impl::take_tiles() {
     // One that is new leads on; changes of known ones go on for ever.
     if (tile_of_instance.count(meta.key) == 0) plan.progress(Clock::now());
     if (meta.valid) {
-      if (message.map_id() != options.map_id) continue;
+      if (!ours(message)) continue;
       epoch_of_writer[meta.writer] = message.epoch();
       tile_of_instance[meta.key] = {message.x(), message.y(), message.z()};
       std::optional<MapTile> tile = dds::tile_from(message);
@@ -238,8 +245,14 @@ void MapMirror::Impl::catch_up() {
                                                    follower.replica().version()};
   if (at != last_at) plan.progress(Clock::now());
   last_at = at;
-  const bool stale = manifest && !follower.current() && manifests.matched() > 0;
-  const auto wish = plan.next(Clock::now(), {stale, follower.has_base(), requests.matched() > 0});
+  const bool stale = manifest && !follower.current() && publishers.present();
+  const bool hears = replies && replies->matched() > 0;
+  const auto wish = plan.next(Clock::now(), {stale, requests.matched() > 0, hears});
+  if (!wish.listen) replies.reset();
+  if (wish.listen && !replies) {
+    replies = std::make_unique<dds::Reader<msg::MapSnapshotReplyPubSubType>>(
+        participant, dds::topics::kSnapshotReply, wakeup);
+  }
   if (tiles && (!wish.gather || wish.restart)) {
     tiles.reset();
     follower.stop_gathering();
@@ -282,14 +295,17 @@ MirrorStatus MapMirror::Impl::status_now() const {
   for (const auto& [key, object] : objects) {
     status.objects += !manifest || object.epoch() == manifest->epoch();
   }
-  status.publisher_present = manifests.matched() > 0;
-  status.publisher_seen = manifests.ever_matched() > 0;
+  status.publisher_present = publishers.present();
+  status.publisher_seen = publishers.followed().has_value();
+  const std::vector<std::uint64_t> rivals = publishers.rivals(Clock::now());
+  status.publishers = rivals.size() + status.publisher_present;
   const bool ended =
       manifest && manifest->final_version() && manifest->version() == replica.version();
   status.stale_because = follower.stale_because();
   if (status.stale_because.empty() && !ended && !status.publisher_present) {
     status.stale_because = "the publisher has gone without ending its run";
   }
+  if (!rivals.empty()) status.stale_because = conflict(options.map_id, status.epoch, rivals);
   status.in_step = status.stale_because.empty();
   status.final_version = ended && status.in_step;
   return status;

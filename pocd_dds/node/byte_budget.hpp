@@ -7,7 +7,7 @@
 
 namespace pocd::dds {
 
-/// What nobody uses is saved for 50 ms at most. A message may overdraw it; the next ones wait for
+/// What nobody uses is saved for 20 ms at most. A message may overdraw it; the next ones wait for
 /// longer. Time is an argument. Not thread-safe.
 class ByteBudget {
  public:
@@ -24,7 +24,7 @@ class ByteBudget {
   void spend(std::size_t bytes) { left_ -= static_cast<double>(bytes); }
 
  private:
-  static constexpr double kSavedS = 0.05;
+  static constexpr double kSavedS = 0.02;
   double rate_, left_;
   Time last_{};
 };

@@ -156,8 +156,9 @@ void Intake::update_status() {
     std::string waiting = input.waiting_for();
     const double silent_s = input.silent_s();
     if (silent_s >= node_.silent_wait_s) {
-      waiting = "has sent no depth image for " + std::to_string(static_cast<long>(silent_s)) +
-                " s: the other robots do not wait for it";
+      if (!waiting.empty()) waiting += "; ";
+      waiting += "has sent no depth image for " + std::to_string(static_cast<long>(silent_s)) +
+                 " s: the other robots do not wait for it";
     } else if (waiting.empty() && merger_.waits_for() == name) {
       waiting = "the other robots wait for its next frame";
     }

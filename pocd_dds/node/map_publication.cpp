@@ -7,9 +7,9 @@
 namespace pocd::dds {
 namespace {
 
-constexpr std::uint32_t kMapId = 0;
-// Small enough that losing one costs little, large enough that a frame's change is a few messages.
-constexpr std::size_t kPartBytes = 256 * 1024;
+// Small enough that what else is sent does not wait long, large enough that a frame's change is a
+// few messages.
+constexpr std::size_t kPartBytes = 64 * 1024;
 constexpr std::chrono::seconds kLongestReply{5};
 constexpr std::chrono::milliseconds kTurn{5};
 
@@ -31,6 +31,7 @@ std::size_t network_bytes(std::size_t payload, const RawWriter& writer) {
 MapPublication::MapPublication(const std::shared_ptr<Participant>& participant,
                                const NodeFile& config, std::uint64_t epoch, Wakeup& wakeup)
     : config_(config),
+      map_id_(static_cast<std::uint32_t>(config.node.map_id)),
       publisher_(epoch, config.pipeline.map),
       tiles_(participant, topics::kMapTiles),
       deltas_(participant, topics::kMapDeltas),
@@ -51,7 +52,7 @@ void MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
   std::optional<MapDelta> delta = publisher_.update(map);
   if (!delta) return;
   stamp_ns_ = stamp_ns;
-  for (auto& message : delta_messages(*delta, kMapId, stamp_ns, kPartBytes)) {
+  for (auto& message : delta_messages(*delta, map_id_, stamp_ns, kPartBytes)) {
     deltas_waiting_.push_back(std::move(message));
   }
   for (const MapTile& tile : delta->changed) tiles_waiting_.push_back(tile.key);
@@ -85,7 +86,7 @@ bool MapPublication::send_tile() {
   const auto tile = publisher_.tiles().find(key);
   const bool present = tile != publisher_.tiles().end();
   auto message =
-      tile_message(present ? tile->second : MapTile{key, 0, {}}, kMapId, publisher_.epoch());
+      tile_message(present ? tile->second : MapTile{key, 0, {}}, map_id_, publisher_.epoch());
   // One that is refused is tried again next time: nobody would miss it otherwise.
   if (present) {
     if (!tiles_.write(message)) return false;
@@ -115,7 +116,7 @@ bool MapPublication::send_reply() {
 
 void MapPublication::send_manifest(std::size_t objects, bool final_version) {
   pocd_msgs::msg::MapManifest manifest;
-  manifest.map_id(kMapId);
+  manifest.map_id(map_id_);
   manifest.epoch(publisher_.epoch());
   manifest.version(announced_.version);
   manifest.stamp(to_time(stamp_ns_));
@@ -134,12 +135,18 @@ void MapPublication::answer_requests() {
   pocd_msgs::msg::MapSnapshotRequest request;
   SampleMeta meta;
   while (requests_.take(request, meta)) {
-    if (!meta.valid || request.map_id() != kMapId) continue;
+    if (!meta.valid || request.map_id() != map_id_) continue;
     const bool same_run = request.epoch() == publisher_.epoch();
     const std::uint64_t held = same_run ? std::min(request.version(), publisher_.version()) : 0;
     wanted_ = wanted_ ? std::min(*wanted_, held) : held;
+    asked_ = std::chrono::steady_clock::now();
   }
   if (!wanted_ || !replies_waiting_.empty()) return;
+  // Who asks has a reader of replies; this side may hear of it later, or it has gone again.
+  if (replies_.matched() == 0) {
+    if (std::chrono::steady_clock::now() - asked_ >= kLongestReply) wanted_.reset();
+    return;
+  }
   // A reply goes to all who listen. As long as one is under way, more who ask wait for the next one
   // together; but not for ever for one who has died.
   if (!replies_.wait_acknowledged(std::chrono::milliseconds(0)) &&
@@ -147,7 +154,7 @@ void MapPublication::answer_requests() {
     return;
   }
   ++snapshots_;
-  auto messages = snapshot_messages(publisher_, *wanted_, kMapId, kPartBytes);
+  auto messages = snapshot_messages(publisher_, *wanted_, map_id_, kPartBytes);
   std::move(messages.begin(), messages.end(), std::back_inserter(replies_waiting_));
   wanted_.reset();
 }
@@ -167,7 +174,7 @@ bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {
   for (;; std::this_thread::sleep_for(kTurn)) {
     answer_requests();
     send_waiting();
-    if (waiting() == 0 && !wanted_) break;
+    if (waiting() == 0 && (!wanted_ || replies_.matched() == 0)) break;
     if (std::chrono::steady_clock::now() >= end) return false;
   }
   return deltas_.wait_acknowledged(time) && tiles_.wait_acknowledged(time) &&

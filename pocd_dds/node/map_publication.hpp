@@ -60,6 +60,7 @@ class MapPublication {
   };
 
   const NodeFile config_;
+  const std::uint32_t map_id_;
   MapPublisher publisher_;
   Writer<pocd_msgs::msg::MapTilePubSubType> tiles_;
   Writer<pocd_msgs::msg::MapDeltaPubSubType> deltas_;
@@ -75,7 +76,7 @@ class MapPublication {
   std::deque<pocd_msgs::msg::MapSnapshotReply> replies_waiting_;
   std::uint64_t step_bytes_ = 0, snapshot_bytes_ = 0, snapshots_ = 0;
   std::optional<std::uint64_t> wanted_;  // version that subscribers who wait have at least
-  std::chrono::steady_clock::time_point answered_{};
+  std::chrono::steady_clock::time_point asked_{}, answered_{};
   std::chrono::steady_clock::time_point last_sent_{};
 };
 

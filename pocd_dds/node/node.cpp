@@ -12,6 +12,7 @@
 #include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 #include "pocd_dds/node/object_publication.hpp"
+#include "pocd_dds/node/rival_watch.hpp"
 #include "pocd_dds/node/ros_outputs.hpp"
 
 namespace pocd::dds {
@@ -39,6 +40,8 @@ struct Node::Impl {
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
         clock(participant, config.node.use_clock, wakeup),
+        rivals(participant, {static_cast<std::uint32_t>(config.node.map_id), options.epoch},
+               wakeup),
         frames(participant, options.epoch),
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
@@ -54,6 +57,7 @@ struct Node::Impl {
   void work();
   void process(const Frame& frame);
   void publish(bool now);
+  void look_for_rivals(IntakeStatus& input);
   void send_status(const std::string& state);
   void send_outputs(bool last);
   void turn();
@@ -69,6 +73,7 @@ struct Node::Impl {
   // run()'s thread only.
   RosOutputs outputs;
   NodeClock clock;
+  RivalWatch rivals;
   Clock::time_point status_sent{};
   bool map_waits = false;
 
@@ -137,8 +142,22 @@ void Node::Impl::publish(bool now) {
   map.send_due(pipeline.map(), counts.stamp_ns, now);
 }
 
+void Node::Impl::look_for_rivals(IntakeStatus& input) {
+  for (const std::uint64_t epoch : rivals.take()) {
+    spdlog::warn(
+        "{}: epoch {:016x} publishes map {} as well: subscribers follow one of the two and say "
+        "that "
+        "they are stale; give each node a node.map_id of its own",
+        topics::kMapManifest.name, epoch, config.node.map_id);
+  }
+  if (rivals.manifests_heard() == 0) return;
+  input.problems.push_back(
+      {topics::kMapManifest.name, "second_publisher", rivals.manifests_heard(), ""});
+}
+
 void Node::Impl::send_status(const std::string& state) {
-  const IntakeStatus input = intake.status();
+  IntakeStatus input = intake.status();
+  look_for_rivals(input);
   const std::lock_guard<std::mutex> lock(mutex);
   counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
   busy_ms = 0.0;
@@ -155,8 +174,8 @@ void Node::Impl::send_outputs(bool last) {
   const StampNs now_ns = clock.now_ns();
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    outputs.collect(objects.objects(), map.publisher().tiles(), map.changed(), counts.stamp_ns,
-                    now_ns, last);
+    outputs.collect({objects.objects(), objects.touched()},
+                    {map.publisher().tiles(), map.changed()}, counts.stamp_ns, now_ns, last);
   }
   outputs.send();
 }

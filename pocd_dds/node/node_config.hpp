@@ -94,6 +94,7 @@ struct RosOutputConfig {
   double occupancy_high_m = 2.0;
   int surface_points = 2'000'000;
   double obstacle_lifetime_s = 3.0;
+  std::string topic_namespace = "pocd";
   std::string level_name = "L1";
 
   template <class Visitor>
@@ -113,6 +114,9 @@ struct RosOutputConfig {
           "Most points of rt/pocd/surface; a larger surface is thinned.");
     visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
           "How long an obstacle that is not sent again stays with the fleet manager [s].");
+    visit("namespace", topic_namespace,
+          "Takes the place of pocd in the names of these topics, but for rt/rmf_obstacles and "
+          "rt/diagnostics, which several nodes may share.");
     visit("level_name", level_name, "Level of the building that the obstacles are on (Open-RMF).");
   }
   std::vector<std::string> inconsistencies() const;
@@ -125,6 +129,7 @@ struct NodeConfig {
   std::string segmentation = "optional";
   std::string color = "absent";
   std::string map_frame = "map";
+  int map_id = 0;
   double sync_wait_s = 0.3;
   double stamp_tolerance_s = 0.001;
   double extrapolation_s = 0.0;
@@ -151,6 +156,8 @@ struct NodeConfig {
           "Segmentation images: not looked at, waited for and gone on without, or necessary.");
     visit("color", color, Choices{{"absent", "optional", "required"}}, "The same for colour.");
     visit("map_frame", map_frame, "Frame of the map: root of the poses.");
+    visit("map_id", map_id, Range{0, 2'147'483'647},
+          "Number of the map in every message: nodes on one domain must have different ones.");
     visit("sync_wait_s", sync_wait_s, Range{0.0, 60.0},
           "How far newer data may run ahead of an incomplete frame [s of data time].");
     visit("stamp_tolerance_s", stamp_tolerance_s, Range{0.0, 1.0},

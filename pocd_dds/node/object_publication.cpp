@@ -6,23 +6,25 @@ ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& partici
                                      const NodeFile& config, std::uint64_t epoch)
     : node_(config.node),
       classes_(config.pipeline.classes),
-      epoch_(epoch),
+      run_{static_cast<std::uint32_t>(config.node.map_id), epoch},
       states_(participant, topics::kObjects),
       events_(participant, topics::kObjectEvents) {}
 
 void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
   stamp_ns_ = stamp_ns;
   for (const ObjectEvent& event : result.events) {
-    auto message = event_message(event, epoch_, classes_, node_.map_frame);
+    auto message = event_message(event, run_, classes_, node_.map_frame);
     events_.write(message);
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
     objects_[object.id] = object;
     changed_.insert(object.id);
+    touched_.insert(object.id);
   }
   for (const ObjectId id : result.retired) {
     objects_.erase(id);
     changed_.erase(id);
+    touched_.insert(id);
     if (published_.erase(id) > 0) gone_.insert(id);
   }
   dispose_gone();
@@ -31,7 +33,7 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
 void ObjectPublication::dispose_gone() {
   for (auto id = gone_.begin(); id != gone_.end();) {
     pocd_msgs::msg::ObjectState state;
-    state.uuid(object_uuid(epoch_, *id));
+    state.uuid(object_uuid(run_.epoch, *id));
     id = states_.dispose(state) ? gone_.erase(id) : std::next(id);
   }
 }
@@ -46,7 +48,7 @@ void ObjectPublication::send_due(bool now) {
   // What Fast DDS refuses, because the writer is full, is tried again next time.
   dispose_gone();
   for (auto id = changed_.begin(); id != changed_.end();) {
-    auto message = object_message(objects_.at(*id), epoch_, classes_, stamp_ns_, node_.map_frame);
+    auto message = object_message(objects_.at(*id), run_, classes_, stamp_ns_, node_.map_frame);
     if (!states_.write(message)) {
       ++id;
       continue;

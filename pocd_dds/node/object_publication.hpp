@@ -26,6 +26,8 @@ class ObjectPublication {
   bool wait_acknowledged(std::chrono::milliseconds time);
 
   const std::map<ObjectId, ObjectSnapshot>& objects() const { return objects_; }
+  /// Objects that are new, have changed or have gone; for the reader to empty.
+  std::set<ObjectId>& touched() { return touched_; }
   std::uint64_t failures() const { return states_.failures() + events_.failures(); }
 
  private:
@@ -33,11 +35,11 @@ class ObjectPublication {
 
   const NodeConfig node_;
   const ClassMap classes_;
-  const std::uint64_t epoch_;
+  const MapRun run_;
   Writer<pocd_msgs::msg::ObjectStatePubSubType> states_;
   Writer<pocd_msgs::msg::ObjectEventPubSubType> events_;
   std::map<ObjectId, ObjectSnapshot> objects_;
-  std::set<ObjectId> changed_, published_, gone_;
+  std::set<ObjectId> changed_, published_, gone_, touched_;
   StampNs stamp_ns_ = 0;
   std::chrono::steady_clock::time_point last_sent_{};
 };

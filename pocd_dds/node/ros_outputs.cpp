@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
+#include <string_view>
 
 #include "pocd/map/birdseye.hpp"
 
@@ -18,6 +19,14 @@ std::string source_of(std::uint64_t epoch) {
 OccupancyOptions occupancy_options(const NodeFile& config) {
   return {config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m(),
           config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m};
+}
+
+/// rt/pocd/map in another namespace; what several nodes may share stays.
+std::string output_topic(const TopicSpec& spec, const std::string& topic_namespace) {
+  constexpr std::string_view kDefault = "rt/pocd/";
+  const std::string_view name = spec.name;
+  if (name.substr(0, kDefault.size()) != kDefault) return spec.name;
+  return "rt/" + topic_namespace + "/" + std::string(name.substr(kDefault.size()));
 }
 
 /// The keys of a list of steps, changed ones and removed ones.
@@ -46,7 +55,9 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
       points_(config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m()) {
   const auto make = [&](auto& writer, const Pace& pace, const TopicSpec& spec) {
     using AnyWriter = typename std::decay_t<decltype(writer)>::element_type;
-    if (!pace.off()) writer = std::make_unique<AnyWriter>(participant, spec);
+    if (pace.off()) return;
+    writer = std::make_unique<AnyWriter>(participant, spec,
+                                         output_topic(spec, rates_.topic_namespace), spec.delivery);
   };
   make(markers_, markers_pace_, topics::kMarkers);
   make(grid_, occupancy_pace_, topics::kOccupancy);
@@ -55,25 +66,26 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
   make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
 }
 
-void RosOutputs::copy_tiles(const std::map<TileKey, MapTile>& tiles, std::set<TileKey>& changed) {
+void RosOutputs::copy_tiles(const Changes<TileKey, MapTile>& tiles) {
   const auto note = [&](const TileKey& key, bool present) {
     if (grid_) grid_steps_[key] = present;
     if (surface_) surface_steps_[key] = present;
   };
-  for (const TileKey& key : changed) {
-    const auto tile = tiles.find(key);
-    if (tile != tiles.end()) {
+  for (const TileKey& key : tiles.keys) {
+    const auto tile = tiles.all.find(key);
+    if (tile != tiles.all.end()) {
       tiles_[key] = tile->second;
       note(key, true);
     } else if (tiles_.erase(key) > 0) {
       note(key, false);
     }
   }
-  changed.clear();
+  tiles.keys.clear();
 }
 
-void RosOutputs::collect(const ObjectsById& objects, const std::map<TileKey, MapTile>& tiles,
-                         std::set<TileKey>& changed, StampNs stamp_ns, StampNs now_ns, bool last) {
+void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
+                         const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns,
+                         bool last) {
   // A topic without any reader is not worked for; who comes later gets it at the next period.
   markers_due_ = markers_ && (markers_pace_.due(now_ns) || last);
   occupancy_due_ = grid_ && (occupancy_pace_.due(now_ns) || last);
@@ -82,8 +94,18 @@ void RosOutputs::collect(const ObjectsById& objects, const std::map<TileKey, Map
   stamp_ns_ = stamp_ns;
   now_ns_ = now_ns;
   last_ = last;
-  if (markers_due_ || obstacles_due_ || surface_due_) objects_ = objects;
-  if (occupancy_due_ || surface_due_) copy_tiles(tiles, changed);
+  if (markers_due_ || obstacles_due_ || surface_due_) {
+    for (const ObjectId id : objects.keys) {
+      const auto object = objects.all.find(id);
+      if (object != objects.all.end()) {
+        objects_[id] = object->second;
+      } else {
+        objects_.erase(id);
+      }
+    }
+    objects.keys.clear();
+  }
+  if (occupancy_due_ || surface_due_) copy_tiles(tiles);
 }
 
 void RosOutputs::send() {

@@ -26,11 +26,16 @@ class RosOutputs {
   RosOutputs(const std::shared_ptr<Participant>& participant, const NodeFile& config,
              std::uint64_t epoch);
 
-  /// Copies what the outputs that are due need; with `last`, the final state for those that keep
-  /// one. `changed`, and removed, of the tiles since it was last emptied: done here when they are
-  /// copied.
-  void collect(const ObjectsById& objects, const std::map<TileKey, MapTile>& tiles,
-               std::set<TileKey>& changed, StampNs stamp_ns, StampNs now_ns, bool last);
+  /// What there is, and which of it is new, has changed or has gone since the set was last emptied.
+  template <class Key, class Value>
+  struct Changes {
+    const std::map<Key, Value>& all;
+    std::set<Key>& keys;
+  };
+  /// Copies what has changed and the outputs that are due need, and empties the sets that it has
+  /// copied; with `last`, the final state for those that keep one.
+  void collect(const Changes<ObjectId, ObjectSnapshot>& objects,
+               const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns, bool last);
   void send();
   /// Of the topics that keep their last state.
   bool wait_acknowledged(std::chrono::milliseconds time);
@@ -40,7 +45,7 @@ class RosOutputs {
   void send_obstacles();
   void send_occupancy();
   void send_surface();
-  void copy_tiles(const std::map<TileKey, MapTile>& tiles, std::set<TileKey>& changed);
+  void copy_tiles(const Changes<TileKey, MapTile>& tiles);
 
   const NodeFile config_;
   const RosOutputConfig& rates_;
@@ -56,7 +61,7 @@ class RosOutputs {
   bool markers_due_ = false, occupancy_due_ = false, surface_due_ = false, obstacles_due_ = false;
   StampNs stamp_ns_ = 0, now_ns_ = 0;
   bool last_ = false;
-  ObjectsById objects_;
+  ObjectsById objects_;               // a copy of the published objects
   std::map<TileKey, MapTile> tiles_;  // a copy of the published map
   // Steps of that copy that the grid and the surface have not taken over yet; true: changed, else
   // removed.

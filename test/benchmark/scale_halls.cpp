@@ -61,11 +61,8 @@ Site::Site(const PipelineConfig& config, int halls, const std::vector<Frame>& dr
     : halls_(halls), publisher_(1, config.map) {
   const std::uint64_t start = heap_in_use();
   pipeline_ = std::make_unique<PocdPipeline>(config);
-  const int columns = static_cast<int>(std::ceil(std::sqrt(halls)));
   for (int n = 0; n < halls; ++n) {
-    const double x_m = (n % columns) * (kLength_m + kGap_m);
-    const double y_m = (n / columns) * (kWidth_m + kGap_m);
-    for (const Frame& frame : drive) process_at(frame, x_m, y_m, "robot" + std::to_string(n));
+    for (const Frame& frame : drive) process_at(frame, place_m(n), "robot" + std::to_string(n));
     const std::uint64_t between = heap_in_use();
     publish();
     publisher_heap_ += heap_in_use() - between;
@@ -73,8 +70,13 @@ Site::Site(const PipelineConfig& config, int halls, const std::vector<Frame>& dr
   pipeline_heap_ = heap_in_use() - start - publisher_heap_;
 }
 
-void Site::process_at(Frame frame, double x_m, double y_m, const std::string& robot) {
-  frame.T_W_C.translation() += Eigen::Vector3d(x_m, y_m, 0.0);
+Eigen::Vector2d Site::place_m(int hall) const {
+  const int columns = static_cast<int>(std::ceil(std::sqrt(halls_)));
+  return {(hall % columns) * (kLength_m + kGap_m), (hall / columns) * (kWidth_m + kGap_m)};
+}
+
+void Site::process_at(Frame frame, const Eigen::Vector2d& at_m, const std::string& robot) {
+  frame.T_W_C.translation() += Eigen::Vector3d(at_m.x(), at_m.y(), 0.0);
   frame.stamp_ns = stamp_ns_ += kPeriod_ns;
   frame.sequence = sequence_++;
   frame.robot = robot;

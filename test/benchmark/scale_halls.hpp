@@ -30,14 +30,17 @@ class Site {
   std::size_t publish();
 
   int halls() const { return halls_; }
+  /// Where the n-th one lies, the first at the origin; whole tiles of the map away.
+  Eigen::Vector2d place_m(int hall) const;
   const PocdPipeline& pipeline() const { return *pipeline_; }
+  PocdPipeline& pipeline() { return *pipeline_; }
   const MapPublisher& publisher() const { return publisher_; }
   /// Heap that pipeline and publication took to build [bytes].
   std::uint64_t pipeline_heap() const { return pipeline_heap_; }
   std::uint64_t publisher_heap() const { return publisher_heap_; }
 
  private:
-  void process_at(Frame frame, double x_m, double y_m, const std::string& robot);
+  void process_at(Frame frame, const Eigen::Vector2d& at_m, const std::string& robot);
 
   int halls_;
   std::unique_ptr<PocdPipeline> pipeline_;

@@ -40,11 +40,11 @@ inline void fill_block(TsdfMap& map, const BlockKey& key, Random& random) {
 class MapSource {
  public:
   MapSource(const TestDomain& domain, std::uint64_t epoch, double rate_mb_s,
-            const std::string& profiles_file = "")
+            const std::string& profiles_file = "", int map_id = 0)
       : map(TsdfConfig{}),
         random(epoch),
         participant(make(domain, profiles_file)),
-        publication(participant, config(rate_mb_s), epoch, wakeup) {}
+        publication(participant, config(rate_mb_s, map_id), epoch, wakeup) {}
 
   /// Changes some blocks of a map of at most `size`^2 columns of tiles, removes some, publishes, at
   /// the latest when the step before has left or `now`.
@@ -86,8 +86,9 @@ class MapSource {
     return std::make_shared<dds::Participant>(
         dds::BusOptions{domain.number(), profiles_file, "pocd_test"});
   }
-  static dds::NodeFile config(double rate_mb_s) {
+  static dds::NodeFile config(double rate_mb_s, int map_id) {
     dds::NodeFile file;
+    file.node.map_id = map_id;
     file.node.map_period_s = 0.0;
     file.node.map_rate_mb_s = rate_mb_s;
     return file;

@@ -86,9 +86,9 @@ TEST(MapBus, TwoHundredLateJoinersConverge) {
   EXPECT_EQ(gathered_by_snapshot, 0u);
 }
 
-// A step of a third of a megabyte, and its tiles, leave at 0.3 MB/s. What is written when its first tile has arrived comes
-// before its last one: an event, because events do not wait for map data, and the delta of the next
-// step, because deltas go before tiles.
+// A step of a third of a megabyte, and its tiles, leave at 0.3 MB/s. What is written when its first
+// tile has arrived comes before its last one: an event, because events do not wait for map data,
+// and the delta of the next step, because deltas go before tiles.
 TEST(MapBus, EventsAndDeltasOvertakeTheTiles) {
   const TestDomain domain;
   MapSource source(domain, 5, 0.3);
@@ -161,13 +161,13 @@ TEST(ByteBudget, SpendsItsRateAndSavesLittle) {
   for (int turn = 0; turn < 1000; ++turn, now += milliseconds(7)) {
     while (budget.open(now)) budget.spend(3000), sent += 3000;
   }
-  EXPECT_NEAR(static_cast<double>(sent), 1e6 * 6.993 + 50'000, 3000);
-  // An hour without anything to send is worth 50 ms; one large message is paid for afterwards.
+  EXPECT_NEAR(static_cast<double>(sent), 1e6 * 6.993 + 20'000, 3000);
+  // An hour without anything to send is worth 20 ms; one large message is paid for afterwards.
   now += std::chrono::hours(1);
   ASSERT_TRUE(budget.open(now));
   budget.spend(150'000);
-  EXPECT_FALSE(budget.open(now + milliseconds(99)));
-  EXPECT_TRUE(budget.open(now + milliseconds(101)));
+  EXPECT_FALSE(budget.open(now + milliseconds(129)));
+  EXPECT_TRUE(budget.open(now + milliseconds(131)));
 }
 
 // Objects and tiles come and go for as long as a node runs; a writer must not count the dead.

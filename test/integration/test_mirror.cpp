@@ -1,8 +1,14 @@
 // Subscribers that come late, and publishers that go without a word.
 #include <gtest/gtest.h>
 
+#include <map>
+#include <mutex>
+
 #include "bus_harness.hpp"
+#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/map_mirror.hpp"
+#include "pocd_dds/object_watch.hpp"
 
 namespace pocd {
 namespace {
@@ -60,6 +66,57 @@ TEST(Mirror, NewRunAfterAKilledPublisherIsNoticedAndTakenOver) {
       << mirror.status().stale_because;
   node.signal(SIGINT);
   EXPECT_EQ(node.wait().exit_code, 0);
+}
+
+// A node that is killed takes no object away; a new run on the same map takes the place of its own.
+TEST(ObjectWatch, ObjectsGoWhenRemovedOrReplacedAndNotWithTheirNode) {
+  const TestDomain domain;
+  std::mutex mutex;
+  std::map<std::array<std::uint8_t, 16>, std::uint32_t> present;
+  std::vector<std::string> said;
+  ObjectWatchOptions options;
+  options.domain = domain.number();
+  options.map_id = 3;
+  options.on_object = [&](const WatchedObject& object) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    present[object.uuid] = to_index(object.state.id);
+  };
+  options.on_gone = [&](const WatchedObject& object, Gone why) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    EXPECT_EQ(present.erase(object.uuid), 1u);
+    said.push_back((why == Gone::kRemoved ? "removed " : "replaced ") +
+                   std::to_string(to_index(object.state.id)));
+  };
+  const ObjectWatch watch(options);
+  const auto count = [&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return present.size();
+  };
+  const auto write = [](auto& objects, const dds::MapRun& run, std::uint32_t id) {
+    ObjectSnapshot object;
+    object.id = static_cast<ObjectId>(id);
+    auto state = dds::object_message(object, run, ClassMap{}, 1, "map");
+    EXPECT_TRUE(objects.write(state));
+    return state;
+  };
+  using Objects = dds::Writer<pocd_msgs::msg::ObjectStatePubSubType>;
+  auto first = std::make_unique<Objects>(test_participant(domain), dds::topics::kObjects);
+  write(*first, {4, 1}, 50);  // of another map
+  for (const std::uint32_t id : {1, 2}) write(*first, {3, 1}, id);
+  auto state = write(*first, {3, 1}, 3);
+  ASSERT_TRUE(eventually([&] { return count() == 3; }));
+  EXPECT_TRUE(watch.publisher_present());
+  EXPECT_TRUE(first->dispose(state));
+  ASSERT_TRUE(eventually([&] { return count() == 2; }));
+  first.reset();
+  ASSERT_TRUE(eventually([&] { return !watch.publisher_present(); }));
+  Objects second(test_participant(domain), dds::topics::kObjects);
+  ASSERT_TRUE(eventually([&] { return watch.publisher_present(); }));
+  EXPECT_EQ(count(), 2u) << "nobody has seen that the places are free";
+  write(second, {3, 2}, 9);
+  ASSERT_TRUE(eventually([&] { return count() == 1; }));
+  const std::lock_guard<std::mutex> lock(mutex);
+  EXPECT_EQ(said, (std::vector<std::string>{"removed 3", "replaced 1", "replaced 2"}));
 }
 
 TEST(Mirror, WithoutAPublisherItSaysSo) {

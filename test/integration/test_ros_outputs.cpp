@@ -2,21 +2,19 @@
 // replay.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <mutex>
 #include <set>
-#include <thread>
 
-#include "bus_harness.hpp"
 #include "map_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/bridge/ros_messages.hpp"
 #include "pocd_dds/map_mirror.hpp"
+#include "pocd_dds/node/ros_outputs.hpp"
 #include "rmf_obstacle_msgsPubSubTypes.h"
 #include "rosgraph_msgsPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"
+#include "whole_run.hpp"
 
 namespace pocd {
 namespace {
@@ -25,26 +23,14 @@ namespace {
 class Tool {
  public:
   explicit Tool(const std::shared_ptr<dds::Participant>& bus)
-      : grid_(bus, dds::topics::kOccupancy, wakeup_),
-        updates_(bus, dds::topics::kOccupancyUpdates, wakeup_),
-        surface_(bus, dds::topics::kSurface, wakeup_),
-        markers_(bus, dds::topics::kMarkers, wakeup_),
-        obstacles_(bus, dds::topics::kRmfObstacles, wakeup_),
-        thread_([this] {
-          while (!stopping_) {
-            wakeup_.wait_for(std::chrono::milliseconds(20));
-            take();
-          }
-        }) {}
-  ~Tool() { stop(); }
-
-  void stop() {
-    if (!thread_.joinable()) return;
-    stopping_ = true;
-    wakeup_.wake();
-    thread_.join();
-    take();
+      : grid_(bus, dds::topics::kOccupancy, taker_.wakeup()),
+        updates_(bus, dds::topics::kOccupancyUpdates, taker_.wakeup()),
+        surface_(bus, dds::topics::kSurface, taker_.wakeup()),
+        markers_(bus, dds::topics::kMarkers, taker_.wakeup()),
+        obstacles_(bus, dds::topics::kRmfObstacles, taker_.wakeup()) {
+    taker_.start([this] { take(); });
   }
+  void stop() { taker_.stop(); }
   /// How many of its topics have a writer.
   int matched() const {
     return (grid_.matched() > 0) + (updates_.matched() > 0) + (surface_.matched() > 0) +
@@ -93,14 +79,12 @@ class Tool {
     }
   }
 
-  dds::Wakeup wakeup_;
+  Taker taker_;
   dds::Reader<nav_msgs::msg::OccupancyGridPubSubType> grid_;
   dds::Reader<map_msgs::msg::OccupancyGridUpdatePubSubType> updates_;
   dds::Reader<sensor_msgs::msg::PointCloud2PubSubType> surface_;
   dds::Reader<visualization_msgs::msg::MarkerArrayPubSubType> markers_;
   dds::Reader<rmf_obstacle_msgs::msg::ObstaclesPubSubType> obstacles_;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
 };
 
 TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
@@ -115,14 +99,10 @@ TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
        "node.outputs.occupancy_hz=10", "--set", "node.outputs.surface_hz=2", "--set",
        "node.outputs.obstacles_hz=10", "--set", "node.outputs.obstacle_lifetime_s=0.5"}));
   ASSERT_TRUE(eventually([&] { return tool.matched() == 5; }));
-  const CommandResult played = run_command(play_command(domain, {"--clock"}));
-  ASSERT_EQ(played.exit_code, 0) << played.err;
-  node.signal(SIGINT);
+  play_and_end(node, play_command(domain, {"--clock"}));
   ASSERT_TRUE(mirror.wait_until(
       [](const MirrorStatus& status) { return status.in_step && status.final_version; },
       kGenerous));
-  const CommandResult ended = node.wait();
-  ASSERT_EQ(ended.exit_code, 0) << ended.err;
   tool.stop();
   const MirrorContents contents = mirror.contents();
 
@@ -174,6 +154,92 @@ TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
       EXPECT_LE(tool.obstacle_stamps[i - 1], tool.obstacle_stamps[i]);
     }
   }
+}
+
+/// The outputs alone, in a time that the test makes.
+struct OutputsInSimulatedTime {
+  explicit OutputsInSimulatedTime(const dds::RosOutputConfig& rates)
+      : bus(test_participant(domain)), outputs(bus, config(rates), 1) {}
+
+  void at(double second) {
+    const auto now_ns = static_cast<StampNs>(second * 1e9) + 1'000'000'000'000;
+    outputs.collect({objects, touched}, {tiles, changed_tiles}, now_ns, now_ns, false);
+    outputs.send();
+  }
+  void put(int id) {
+    objects[static_cast<ObjectId>(id)].id = static_cast<ObjectId>(id);
+    touched.insert(static_cast<ObjectId>(id));
+  }
+  void remove(int id) {
+    objects.erase(static_cast<ObjectId>(id));
+    touched.insert(static_cast<ObjectId>(id));
+  }
+  static dds::NodeFile config(const dds::RosOutputConfig& rates) {
+    dds::NodeFile file;
+    file.node.outputs = rates;
+    return file;
+  }
+
+  const TestDomain domain;
+  std::shared_ptr<dds::Participant> bus;
+  dds::RosOutputs outputs;
+  dds::ObjectsById objects;
+  std::set<ObjectId> touched;
+  std::map<TileKey, MapTile> tiles;
+  std::set<TileKey> changed_tiles;
+};
+
+// As Open-RMF's obstacle manager does it: an obstacle is there until it is deleted or its lifetime
+// since the last message about it is over.
+TEST(RosOutputs, ObstaclesAreRefreshedInTimeAndGoByDeleteAndByLapse) {
+  dds::RosOutputConfig rates;
+  rates.obstacles_hz = 2.0;
+  rates.markers_hz = 5.0;
+  rates.occupancy_hz = rates.surface_hz = 0.0;
+  rates.obstacle_lifetime_s = 1.25;
+  OutputsInSimulatedTime node(rates);
+  dds::Wakeup wakeup;
+  dds::Reader<rmf_obstacle_msgs::msg::ObstaclesPubSubType> reader(
+      node.bus, dds::topics::kRmfObstacles, wakeup);
+  dds::Reader<visualization_msgs::msg::MarkerArrayPubSubType> marker_reader(
+      node.bus, dds::topics::kMarkers, wakeup);
+  ASSERT_TRUE(eventually([&] { return reader.matched() > 0 && marker_reader.matched() > 0; }));
+  std::map<int, StampNs> ends_ns;  // what the manager has
+  int messages = 0, marker_messages = 0, deletes = 0;
+  node.put(1), node.put(2);
+  const auto stamp = [](double second) {
+    return static_cast<StampNs>(second * 1e9) + 1'000'000'000'000;
+  };
+  for (int tick = 0; tick < 200; ++tick) {  // ten seconds
+    const double second = 0.05 * tick;
+    if (tick == 100) node.remove(2);
+    node.at(second);
+    rmf_obstacle_msgs::msg::Obstacles list;
+    visualization_msgs::msg::MarkerArray array;
+    dds::SampleMeta meta;
+    while (marker_reader.take(array, meta)) ++marker_messages;
+    while (reader.take(list, meta)) {
+      ++messages;
+      for (const auto& obstacle : list.obstacles()) {
+        if (obstacle.action() == 2) {
+          ++deletes;
+          ends_ns.erase(obstacle.id());
+          continue;
+        }
+        ends_ns[obstacle.id()] = dds::to_stamp(obstacle.header().stamp()) +
+                                 obstacle.lifetime().sec() * 1'000'000'000 +
+                                 obstacle.lifetime().nanosec();
+      }
+    }
+    // None lapses while it is there, not even when a message is lost.
+    ASSERT_EQ(ends_ns.size(), tick < 100 ? 2u : 1u) << second;
+    for (const auto& [id, end_ns] : ends_ns) EXPECT_GT(end_ns, stamp(second + 0.5)) << id;
+  }
+  EXPECT_EQ(messages, 20) << "twice a second";
+  EXPECT_EQ(marker_messages, 50) << "five times a second";
+  EXPECT_EQ(deletes, 5) << "a message may be lost";
+  // The component has gone: the manager forgets all within the lifetime.
+  for (const auto& [id, end_ns] : ends_ns) EXPECT_LE(end_ns, stamp(9.95 + 1.25)) << id;
 }
 
 TEST(RosOutputs, EachCanBeSwitchedOff) {

@@ -6,11 +6,9 @@
 #include <set>
 #include <sstream>
 
-#include "bus_harness.hpp"
 #include "peer_log.hpp"
-#include "pocd/config/config_io.hpp"
-#include "pocd/config/run_summary.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
+#include "whole_run.hpp"
 
 namespace pocd {
 namespace {
@@ -40,7 +38,7 @@ class Cyclone : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     const std::filesystem::path folder = folder_->path();
-    expected_ = offline(folder / "offline");
+    expected_ = offline_run(small_drives(), folder / "offline");
     DatasetOptions dataset;
     dataset.format = "sim";
     dataset.inputs = {small_drives()};
@@ -77,16 +75,6 @@ class Cyclone : public testing::Test {
   static void TearDownTestSuite() { folder_.reset(); }
 
   void SetUp() override { ASSERT_NE(log_, nullptr) << "the run failed"; }
-
-  static RunSummary offline(const std::filesystem::path& output) {
-    const CommandResult result =
-        run_command({bin("pocd_map"), "--dataset", "sim", "--input", small_drives(), "--config",
-                     source("config/simulated.yaml"), "--output", output.string()});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    RunSummary summary;
-    load_config(summary, {output / "summary.yaml"});
-    return summary;
-  }
 
   /// Null, with the reason in no_capture_, where nothing may be captured.
   static std::unique_ptr<Process> start_capture(const TestDomain& domain,

@@ -2,12 +2,16 @@
 // the installed prefix; and run beside a real component.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "bus_harness.hpp"
 
 namespace pocd {
 namespace {
 
 TEST(Example, LaneWatchSeesWhatComesAndGoes) {
+  const std::string text = read_text(source("pocd_dds/examples/lane_watch/lane_watch.cpp"));
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 60) << "is to be read at a glance";
   const TemporaryFolder folder;
   const std::string prefix = POCD_BIN_DIR "/..", build = (folder.path() / "build").string();
   const CommandResult configured = run_command(

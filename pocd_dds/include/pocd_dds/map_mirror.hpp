@@ -26,7 +26,7 @@ struct MirrorOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd_mirror";
-  std::uint32_t map_id = 0;
+  std::uint32_t map_id = 0;  ///< the publisher's `node.map_id`
   CatchUp catch_up = CatchUp::kEither;
   /// Called for every event in order, by the mirror's thread, with the name of the object's class.
   /// Events from before the mirror joined are not repeated.
@@ -44,6 +44,8 @@ struct MirrorStatus {
   std::size_t tiles = 0;
   std::size_t objects = 0;
   bool publisher_present = false;
+  /// Nodes that say they publish this map. More than one: the copy follows the first and is stale.
+  std::size_t publishers = 0;
   bool publisher_seen = false;  ///< at any time
   bool final_version = false;   ///< the publisher has ended its run in order, at this version
   std::uint64_t deltas = 0, gaps = 0, corrupt = 0;

@@ -1,0 +1,59 @@
+// What stands where and what happened to it, for a fleet manager. No DDS type shows here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "pocd/pipeline/frame_result.hpp"
+
+namespace pocd {
+
+struct WatchedObject {
+  std::array<std::uint8_t, 16> uuid{};  ///< never used twice, by no node and no run
+  std::uint64_t epoch = 0;              ///< run of the node that says so
+  std::string class_name;
+  ObjectSnapshot state;
+};
+
+enum class Gone {
+  kRemoved,  ///< it was seen that it is not there any more, or it turned out to be another one
+  kReplaced  ///< its node was killed or has ended, and a new run, with names of its own, goes on
+};
+
+/// Callbacks may be empty. They are called one at a time, by the watch's thread, in the order in
+/// which the bus gives the samples of a topic; objects and events are two topics.
+struct ObjectWatchOptions {
+  int domain = 0;             ///< 0 .. 232
+  std::string profiles_file;  ///< XML profiles of the operator; empty: none
+  std::string name = "pocd_object_watch";
+  std::uint32_t map_id = 0;  ///< the publisher's `node.map_id`
+  /// New, or changed. Who joins late gets all there are.
+  std::function<void(const WatchedObject&)> on_object;
+  /// With its last state. A node that ends or dies takes no object away: nobody has seen that the
+  /// place is free.
+  std::function<void(const WatchedObject&, Gone why)> on_gone;
+  /// Events from before the watch joined are not repeated.
+  std::function<void(const ObjectEvent&, const std::string& class_name)> on_event;
+};
+
+/// Listens with a thread of its own, from construction on.
+class ObjectWatch {
+ public:
+  /// Throws InputError when the bus cannot be used.
+  explicit ObjectWatch(const ObjectWatchOptions& options);
+  ~ObjectWatch();
+  ObjectWatch(const ObjectWatch&) = delete;
+  ObjectWatch& operator=(const ObjectWatch&) = delete;
+
+  /// False: nobody says what is there now, and what was heard may be out of date. Thread-safe.
+  bool publisher_present() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pocd

@@ -1,0 +1,123 @@
+#include "pocd_dds/object_watch.hpp"
+
+#include <atomic>
+#include <map>
+#include <thread>
+
+#include "mirror/shared_participant.hpp"
+#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/entities/reader.hpp"
+#include "pocd_msgsPubSubTypes.h"
+
+namespace pocd {
+namespace {
+
+constexpr std::chrono::milliseconds kIdle{50};
+
+/// With the last sample only, a dispose would take the place of a state that was not read yet, and
+/// a state that of the one before.
+dds::Delivery every_sample() {
+  dds::Delivery delivery = dds::topics::kObjects.delivery;
+  delivery.keep_last = 0;
+  delivery.max_instances = 0;
+  return delivery;
+}
+
+}  // namespace
+
+struct ObjectWatch::Impl {
+  explicit Impl(const ObjectWatchOptions& given)
+      : options(given),
+        participant(dds::shared_participant({given.domain, given.profiles_file, given.name})),
+        states(participant, dds::topics::kObjects, dds::topics::kObjects.name, every_sample(),
+               wakeup),
+        events(participant, dds::topics::kObjectEvents, wakeup),
+        thread([this] { run(); }) {}
+  ~Impl() {
+    stopping = true;
+    wakeup.wake();
+    thread.join();
+  }
+
+  void run();
+  void take_states();
+  void take_events();
+  void forget_replaced();
+  void gone(const std::array<std::uint8_t, 16>& uuid, Gone why);
+
+  struct Known {
+    WatchedObject object;
+    dds::SampleMeta::Guid writer{};
+  };
+  const ObjectWatchOptions options;
+  dds::Wakeup wakeup;
+  std::shared_ptr<dds::Participant> participant;
+  dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> states;
+  dds::Reader<pocd_msgs::msg::ObjectEventPubSubType> events;
+  std::map<std::array<std::uint8_t, 16>, Known> known;
+  std::pair<int, int> matched_before{0, 0};
+  std::atomic<bool> stopping{false};
+  std::thread thread;
+};
+
+void ObjectWatch::Impl::run() {
+  while (!stopping) {
+    wakeup.wait_for(kIdle);
+    take_states();
+    take_events();
+  }
+}
+
+void ObjectWatch::Impl::take_states() {
+  pocd_msgs::msg::ObjectState state;
+  dds::SampleMeta meta;
+  bool taken = false;
+  while (states.take(state, meta)) {
+    if (meta.disposed) gone(meta.key, Gone::kRemoved);
+    // Not valid and not disposed: its node has gone, which says nothing about the object.
+    if (!meta.valid || state.map_id() != options.map_id) continue;
+    taken = true;
+    Known& entry = known[state.uuid()];
+    entry = {{state.uuid(), state.epoch(), state.class_name(), dds::object_from(state)},
+             meta.writer};
+    if (options.on_object) options.on_object(entry.object);
+  }
+  // The bus may tell of a writer after its first sample.
+  const std::pair<int, int> matched{states.matched(), states.ever_matched()};
+  if (taken || matched != matched_before) forget_replaced();
+  matched_before = matched;
+}
+
+void ObjectWatch::Impl::forget_replaced() {
+  std::vector<std::array<std::uint8_t, 16>> orphans;
+  for (const auto& [uuid, entry] : known) {
+    if (!states.has_writer(entry.writer)) orphans.push_back(uuid);
+  }
+  if (orphans.size() == known.size()) return;  // no run that goes on
+  for (const auto& uuid : orphans) gone(uuid, Gone::kReplaced);
+}
+
+void ObjectWatch::Impl::gone(const std::array<std::uint8_t, 16>& uuid, Gone why) {
+  const auto entry = known.find(uuid);
+  if (entry == known.end()) return;
+  const WatchedObject last = std::move(entry->second.object);
+  known.erase(entry);
+  if (options.on_gone) options.on_gone(last, why);
+}
+
+void ObjectWatch::Impl::take_events() {
+  pocd_msgs::msg::ObjectEvent message;
+  dds::SampleMeta meta;
+  while (events.take(message, meta)) {
+    if (!meta.valid || !options.on_event || message.map_id() != options.map_id) continue;
+    options.on_event(dds::event_from(message), message.class_name());
+  }
+}
+
+ObjectWatch::ObjectWatch(const ObjectWatchOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
+ObjectWatch::~ObjectWatch() = default;
+
+bool ObjectWatch::publisher_present() const { return impl_->states.matched() > 0; }
+
+}  // namespace pocd

@@ -1,0 +1,44 @@
+// Whether another node publishes the same map.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/entities/reader.hpp"
+#include "pocd_msgsPubSubTypes.h"
+
+namespace pocd::dds {
+
+/// Two nodes with one map id write the same keys: subscribers can follow one of them only. Not
+/// thread-safe.
+class RivalWatch {
+ public:
+  RivalWatch(const std::shared_ptr<Participant>& participant, const MapRun& own, Wakeup& wakeup)
+      : own_(own), manifests_(participant, topics::kMapManifest, wakeup) {}
+
+  /// Epochs that were not heard before.
+  std::vector<std::uint64_t> take() {
+    std::vector<std::uint64_t> fresh;
+    pocd_msgs::msg::MapManifest manifest;
+    SampleMeta meta;
+    while (manifests_.take(manifest, meta)) {
+      const bool same_map = meta.valid && manifest.map_id() == own_.map_id;
+      // One that has ended its run says so for as long as it is there, and is none.
+      if (!same_map || manifest.epoch() == own_.epoch || manifest.final_version()) continue;
+      ++manifests_heard_;
+      if (known_.insert(manifest.epoch()).second) fresh.push_back(manifest.epoch());
+    }
+    return fresh;
+  }
+  std::uint64_t manifests_heard() const { return manifests_heard_; }
+
+ private:
+  const MapRun own_;
+  Reader<pocd_msgs::msg::MapManifestPubSubType> manifests_;
+  std::set<std::uint64_t> known_;
+  std::uint64_t manifests_heard_ = 0;
+};
+
+}  // namespace pocd::dds
