@@ -18,6 +18,7 @@ constexpr std::array<std::array<int, 2>, 9> kRows = {
     {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 
 float square(float x) { return x * x; }
+float just_beyond(float x) { return std::nextafter(x, 2.0f * x); }
 
 }  // namespace
 
@@ -91,13 +92,19 @@ IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inl
 }
 
 void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbour& best) {
-  const Eigen::Array3i cell = level.cell_of(query);
-  if ((cell < 1).any() || (cell > level.cells - 2).any()) return;
-  const Eigen::Array3f below = query.array() - (cell - kBorder).cast<float>() * level.cell_m;
-  const Eigen::Array3f above = level.cell_m - below;
+  // What cell_of() does, four at a time, for the sake of vector instructions.
+  const Eigen::Array4f point(query.x(), query.y(), query.z(), 0.0f);
+  const Eigen::Array4f floor = (point / level.cell_m).floor().max(-1e6f).min(1e6f);
+  const Eigen::Array4i cell = floor.cast<int>() + kBorder;
+  const bool inside = cell.x() >= 1 && cell.y() >= 1 && cell.z() >= 1 &&
+                      cell.x() <= level.cells.x() - 2 && cell.y() <= level.cells.y() - 2 &&
+                      cell.z() <= level.cells.z() - 2;
+  if (!inside) return;
+  const Eigen::Array4f below = point - floor * level.cell_m;
+  const Eigen::Array4f above = level.cell_m - below;
   const float gap_y[3] = {square(below.y()), 0.0f, square(above.y())};
   const float gap_z[3] = {square(below.z()), 0.0f, square(above.z())};
-  const int center = level.flat_index(cell);
+  const int center = level.flat_index(cell.head<3>());
   const int row_y = level.cells.x(), row_z = level.cells.x() * level.cells.y();
   const std::uint32_t* const begin = level.begin.data();
   const Eigen::Vector3f* const points = level.points.data();
@@ -121,11 +128,21 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
   best.normal = level.normals[found];
 }
 
+std::optional<IcpTarget::Neighbour> IcpTarget::nearest_inlier(const Eigen::Vector3f& query) const {
+  Neighbour best;
+  const double limit2 = inlier_distance_m_ * inlier_distance_m_;
+  // A little more, so that no rounding leaves one out.
+  const float beyond = static_cast<float>(1.001 * limit2);
+  best.squared_distance_m2 = beyond;
+  search(levels_.front(), query, best);  // has all points, in cells that are not smaller
+  if (best.squared_distance_m2 == beyond || best.squared_distance_m2 > limit2) return std::nullopt;
+  return best;
+}
+
 std::optional<IcpTarget::Neighbour> IcpTarget::nearest(const Eigen::Vector3f& query) const {
   Neighbour best;
-  const float limit = square(static_cast<float>(max_correspondence_m_));
   // Points on the limit itself belong to it.
-  best.squared_distance_m2 = std::nextafter(limit, 2.0f * limit);
+  best.squared_distance_m2 = just_beyond(square(static_cast<float>(max_correspondence_m_)));
   const float none = best.squared_distance_m2;
   for (const Level& level : levels_) {
     search(level, query, best);

@@ -128,7 +128,9 @@ void BlockFinder::scan_tile_row(int tile_row) {
       band_cells(row, depth, count, static_cast<float>(columns_[first]),
                  static_cast<float>(step_px_), cells);
       for (int i = 0; i < points * count; ++i) {
-        marks_[cells[i]].store(1, std::memory_order_relaxed);
+        // Most are marked already: a line that is only read stays in every processor's cache.
+        std::atomic<std::uint8_t>& mark = marks_[cells[i]];
+        if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
       }
     }
   }

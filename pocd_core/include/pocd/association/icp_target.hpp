@@ -34,6 +34,8 @@ class IcpTarget {
   /// Nearest point within max_correspondence_m() of `query`, given relative to origin_W().
   /// Of equally near points always the same one.
   std::optional<Neighbour> nearest(const Eigen::Vector3f& query) const;
+  /// The same within inlier_distance_m(), and faster.
+  std::optional<Neighbour> nearest_inlier(const Eigen::Vector3f& query) const;
 
   /// Corner of the points' bounding box. Coordinates relative to it keep float precision in a large
   /// map.
