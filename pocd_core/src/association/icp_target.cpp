@@ -51,7 +51,27 @@ IcpTarget::Level IcpTarget::make_level(const std::vector<Eigen::Vector3f>& point
     level.points[slot] = points[i];
     level.normals[slot] = normals[i];
   }
+  level.note_rows();
   return level;
+}
+
+void IcpTarget::Level::note_rows() {
+  rows.assign(begin.size() - 1, 0);
+  std::array<int, kRows.size()> step;  // from a cell to the middle of its n-th row
+  for (std::size_t n = 0; n < kRows.size(); ++n) {
+    step[n] = (kRows[n][1] * cells.y() + kRows[n][0]) * cells.x();
+  }
+  for (std::size_t c = 0; c < rows.size(); ++c) {
+    if (begin[c] == begin[c + 1]) continue;
+    for (std::size_t n = 0; n < kRows.size(); ++n) {
+      // The border keeps the cells around a point within the grid.
+      const std::size_t around = c - static_cast<std::size_t>(static_cast<std::ptrdiff_t>(step[n]));
+      const auto bit = static_cast<std::uint16_t>(1u << n);
+      for (const std::size_t cell : {around - 1, around, around + 1}) {
+        rows[cell] = static_cast<std::uint16_t>(rows[cell] | bit);
+      }
+    }
+  }
 }
 
 IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inlier_distance_m,
@@ -100,20 +120,25 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
                       cell.x() <= level.cells.x() - 2 && cell.y() <= level.cells.y() - 2 &&
                       cell.z() <= level.cells.z() - 2;
   if (!inside) return;
+  const int center = level.flat_index(cell.head<3>());
+  if (level.rows[static_cast<std::size_t>(center)] == 0) return;
   const Eigen::Array4f below = point - floor * level.cell_m;
   const Eigen::Array4f above = level.cell_m - below;
-  const float gap_y[3] = {square(below.y()), 0.0f, square(above.y())};
-  const float gap_z[3] = {square(below.z()), 0.0f, square(above.z())};
-  const int center = level.flat_index(cell.head<3>());
-  const int row_y = level.cells.x(), row_z = level.cells.x() * level.cells.y();
-  const std::uint32_t* const begin = level.begin.data();
+  const float y0 = square(below.y()), y2 = square(above.y());
+  const float z0 = square(below.z()), z2 = square(above.z());
+  const int y = level.cells.x(), z = level.cells.x() * level.cells.y();
+  // In the order of kRows: how far a row is from the query at least, and where its middle is.
+  const float gap[] = {0.0f, y0, y2, z0, z2, y0 + z0, y2 + z0, y0 + z2, y2 + z2};
+  const int step[] = {0, -y, y, -z, z, -y - z, y - z, z - y, y + z};
+  const std::uint32_t* const begin = level.begin.data() + center;
   const Eigen::Vector3f* const points = level.points.data();
   const auto none = static_cast<std::uint32_t>(level.points.size());
   std::uint32_t found = none;
   float nearest = best.squared_distance_m2;
-  for (const auto& [dy, dz] : kRows) {
-    if (gap_y[dy + 1] + gap_z[dz + 1] >= nearest) continue;
-    const int middle = center + dy * row_y + dz * row_z;
+  for (unsigned rows = level.rows[static_cast<std::size_t>(center)]; rows != 0; rows &= rows - 1) {
+    const int n = __builtin_ctz(rows);
+    if (gap[n] >= nearest) continue;
+    const std::ptrdiff_t middle = step[n];
     const std::uint32_t end = begin[middle + 2];
     for (std::uint32_t i = begin[middle - 1]; i < end; ++i) {
       const float d2 = (points[i] - query).squaredNorm();

@@ -16,8 +16,8 @@
 namespace pocd {
 namespace {
 
-/// How long a thread looks before it lies down to sleep: as long as being woken up takes.
-constexpr std::chrono::microseconds kLook{50};
+/// How long a thread looks before it lies down to sleep: about as long as being woken up takes.
+constexpr std::chrono::microseconds kLook{100};
 
 void relax() {
 #if defined(__x86_64__)
@@ -53,7 +53,7 @@ struct ThreadPool::Impl {
   const Piece* piece = nullptr;
   std::size_t count = 0, grain = 1;
   bool open = false;  ///< workers may still join the job
-  std::atomic<std::uint64_t> job{0};
+  std::atomic<std::uint64_t> job{0}, roused{0};
   std::atomic<std::size_t> inside{0};  ///< workers that have joined and not left
   std::atomic<bool> stop{false};
   double worker_cpu_ms = 0.0;
@@ -75,13 +75,15 @@ struct ThreadPool::Impl {
   }
 
   void work() {
-    std::uint64_t seen = 0;
+    std::uint64_t seen = 0, seen_roused = 0;
     const auto called = [&] { return stop || job != seen; };
     for (;;) {
       if (look) look_for(called);
       std::unique_lock<std::mutex> lock(mutex);
-      wake.wait(lock, called);
+      wake.wait(lock, [&] { return called() || roused != seen_roused; });
       if (stop) return;
+      seen_roused = roused;
+      if (job == seen) continue;
       seen = job;
       if (!open) continue;  // the others were done before this one woke up
       ++inside;
@@ -139,6 +141,15 @@ ThreadPool::~ThreadPool() {
 }
 
 int ThreadPool::threads() const { return static_cast<int>(impl_->workers.size()) + 1; }
+
+void ThreadPool::rouse() {
+  if (impl_->workers.empty() || !impl_->look) return;
+  {
+    const std::lock_guard<std::mutex> lock(impl_->mutex);
+    ++impl_->roused;
+  }
+  impl_->wake.notify_all();
+}
 
 double ThreadPool::worker_cpu_ms() const {
   const std::lock_guard<std::mutex> lock(impl_->mutex);

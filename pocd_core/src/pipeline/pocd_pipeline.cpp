@@ -134,15 +134,18 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
 
 void PocdPipeline::Impl::paint_owners() {
   owners.resize(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const std::int32_t observation = observations.observation_of[i];
-    if (mask_missing || cloud.kind[i] == PixelKind::kDynamic ||
-        cloud.kind[i] == PixelKind::kIgnore) {
-      owners[i] = IntegrationInput::kSkip;
-    } else {
-      owners[i] = observation == Observations::kNone ? 0 : owner_of_observation[observation];
+  constexpr std::size_t kGrain = 8192;
+  pool.parallel_for(cloud.size(), kGrain, [this](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::int32_t observation = observations.observation_of[i];
+      if (mask_missing || cloud.kind[i] == PixelKind::kDynamic ||
+          cloud.kind[i] == PixelKind::kIgnore) {
+        owners[i] = IntegrationInput::kSkip;
+      } else {
+        owners[i] = observation == Observations::kNone ? 0 : owner_of_observation[observation];
+      }
     }
-  }
+  });
 }
 
 void PocdPipeline::Impl::integrate(const Frame& frame) {
