@@ -1,5 +1,7 @@
 #include "map_run.hpp"
 
+#include <time.h>
+
 #include <chrono>
 #include <cstdio>
 #include <fstream>
@@ -19,6 +21,13 @@ namespace {
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Of all threads: the simulator has several.
+double process_cpu_ms() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
 /// A line on the terminal that renews itself a few times per second.
@@ -90,13 +99,15 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
       break;
     }
     const auto read_start = std::chrono::steady_clock::now();
+    const double read_cpu_start_ms = process_cpu_ms();
     std::optional<Frame> frame = reader->next();
     // The pose that a node would get, in every bit; a recording's frames have made that way
     // already.
     if (frame && options.dataset.format != "mcap") {
       frame->T_W_C = through_messages(frame->T_W_C, reader->extrinsics().T_B_C);
     }
-    const double read_ms = 1e3 * seconds_since(read_start);
+    const StageTiming read{"read", 1e3 * seconds_since(read_start),
+                           process_cpu_ms() - read_cpu_start_ms};
     for (; reported < reader->problems().size(); ++reported) {
       report("skipped: " + reader->problems()[reported]);
     }
@@ -120,7 +131,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
       events.add(event, options.config.classes.name(event.class_id));
     }
     count(result.events, summary);
-    result.timings.insert(result.timings.begin(), {"read", read_ms});
+    result.timings.insert(result.timings.begin(), read);
     timing.add(*frame, result.timings);
     progress.update(summary);
   }

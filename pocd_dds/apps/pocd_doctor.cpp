@@ -59,7 +59,8 @@ Findings check_bus(const DoctorOptions& options, NodeFile config) {
   const NodeConfig expected = config.node;
   config.node.lossless = false;  // that would hold senders back
   FrameQueue frames(1);
-  Intake intake(listener, config.node, config.pipeline.classes, intake_watch, frames);
+  LatencyLog latency("");
+  Intake intake(listener, config.node, config.pipeline.classes, intake_watch, frames, latency);
   const auto end = std::chrono::steady_clock::now() +
                    std::chrono::milliseconds(static_cast<long>(1e3 * options.listen_s));
   while (!stop_requested && std::chrono::steady_clock::now() < end) {

@@ -1,4 +1,5 @@
 // The component: camera, segmentation and odometry topics in, objects and map deltas out.
+#include <algorithm>
 #include <random>
 
 #include "apps/common.hpp"
@@ -76,6 +77,8 @@ int main(int argc, char** argv) {
   app.add_flag("--dump", dump, "Print the effective configuration and end");
   app.add_flag("--parameters", show_parameters,
                "Print the page of the parameters under `node` and end");
+  app.add_option("--latency", options.latency_file,
+                 "File for the time that each frame took from its last image to its map delta");
   int domain = -1;
   pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
   try {
@@ -119,6 +122,14 @@ int main(int argc, char** argv) {
     const pocd::dds::WorkStatus work = node.work_status();
     spdlog::info("ended: {} frames processed, {} refused, {} objects, map version {}",
                  work.processed, work.refused, work.objects, work.map_version);
+    const double frames = static_cast<double>(std::max<std::uint64_t>(1, work.processed));
+    spdlog::info(
+        "CPU per frame [ms]: pipeline {:.2f}, publishing {:.2f}, taking images {:.2f}, the rest of "
+        "the intake {:.2f}, the middleware's threads and others {:.2f}",
+        work.pipeline_cpu_ms / frames, work.publishing_cpu_ms / frames, work.take_cpu_ms / frames,
+        (work.intake_cpu_ms - work.take_cpu_ms) / frames,
+        (work.process_cpu_ms - work.pipeline_cpu_ms - work.publishing_cpu_ms - work.intake_cpu_ms) /
+            frames);
     return good ? 0 : 1;
   });
 }

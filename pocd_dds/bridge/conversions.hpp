@@ -23,12 +23,7 @@ namespace pocd::dds {
 StampNs to_stamp(const builtin_interfaces::msg::Time& time);
 builtin_interfaces::msg::Time to_time(StampNs stamp_ns);
 
-// ---- input: pocd/input/message_checks.hpp says what is accepted ----
-
-Checked<cv::Mat> depth_from(const sensor_msgs::msg::Image& image);
-Checked<cv::Mat> color_from(const sensor_msgs::msg::Image& image);
-
-Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& image, const ColourTable& colours);
+// ---- input: pocd/input/message_checks.hpp says what is accepted; images: image_visit.hpp ----
 
 Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info);
 

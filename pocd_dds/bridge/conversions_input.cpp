@@ -3,11 +3,6 @@
 namespace pocd::dds {
 namespace {
 
-ImageView view_of(const sensor_msgs::msg::Image& image) {
-  return {image.width(), image.height(),      image.encoding(),   image.is_bigendian() != 0,
-          image.step(),  image.data().data(), image.data().size()};
-}
-
 StampedTransform transform_of(const std_msgs::msg::Header& header, const std::string& child) {
   StampedTransform transform;
   transform.parent = header.frame_id();
@@ -33,18 +28,6 @@ builtin_interfaces::msg::Time to_time(StampNs stamp_ns) {
   time.sec(static_cast<std::int32_t>(seconds));
   time.nanosec(static_cast<std::uint32_t>(rest));
   return time;
-}
-
-Checked<cv::Mat> depth_from(const sensor_msgs::msg::Image& image) {
-  return depth_image(view_of(image));
-}
-
-Checked<cv::Mat> color_from(const sensor_msgs::msg::Image& image) {
-  return color_image(view_of(image));
-}
-
-Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& image, const ColourTable& colours) {
-  return label_image(view_of(image), colours);
 }
 
 Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info) {

@@ -93,6 +93,7 @@ bool RawReader::take_raw(void* sample, SampleMeta& meta) {
   std::copy(key, key + meta.key.size(), meta.key.begin());
   const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
   std::copy(writer, writer + meta.writer.size(), meta.writer.begin());
+  meta.received_ns = info.reception_timestamp.to_ns();
   return true;
 }
 

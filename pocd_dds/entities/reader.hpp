@@ -21,7 +21,8 @@ struct SampleMeta {
   /// Key of a keyed sample, as the instance handle has it; our keys are 16 bytes and fit as they
   /// are.
   std::array<std::uint8_t, 16> key{};
-  Guid writer{};  ///< of the one who wrote
+  Guid writer{};                 ///< of the one who wrote
+  std::int64_t received_ns = 0;  ///< when the reader had all of it, wall clock
 };
 
 /// What does not depend on the type. take() from one thread at a time; the rest is thread-safe.

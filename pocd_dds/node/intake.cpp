@@ -24,11 +24,12 @@ StampNs wall_clock_ns() {
 }  // namespace
 
 Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-               const ClassMap& classes, BusWatch& watch, FrameQueue& queue)
+               const ClassMap& classes, BusWatch& watch, FrameQueue& queue, LatencyLog& latency)
     : participant_(participant),
       node_(node),
       watch_(watch),
       queue_(queue),
+      latency_(latency),
       colours_(classes),
       roster_(node, problems_),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
@@ -66,7 +67,7 @@ void Intake::meet(const std::string& name, const RobotConfig& config, bool named
   Robot& robot = robots_[name];
   robot.named = named;
   robot.input = std::make_unique<RobotInput>(participant_, node_, config, colours_, transforms_,
-                                             problems_, wakeup_);
+                                             problems_, wakeup_, latency_);
 }
 
 void Intake::follow_roster() {
@@ -131,6 +132,7 @@ bool Intake::see_off(const Robot& robot) {
   // The roster and the readers hear of a departure in either order.
   if (robot.named || robot.announced || input.live() || !input.settled()) return false;
   merger_.forget(input.name());
+  departed_take_cpu_ms_ += input.take_cpu_ms();
   return true;
 }
 
@@ -151,8 +153,11 @@ void Intake::hand_over(bool last) {
 
 void Intake::update_status() {
   IntakeStatus status;
+  status.cpu_ms = thread_cpu_ms();
+  status.take_cpu_ms = departed_take_cpu_ms_;
   for (const auto& [name, robot] : robots_) {
     const RobotInput& input = *robot.input;
+    status.take_cpu_ms += input.take_cpu_ms();
     std::string waiting = input.waiting_for();
     const double silent_s = input.silent_s();
     if (silent_s >= node_.silent_wait_s) {

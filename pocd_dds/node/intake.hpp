@@ -14,6 +14,7 @@
 #include "pocd/input/frame_merger.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/frame_queue.hpp"
+#include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/robot_input.hpp"
 #include "pocd_dds/node/roster.hpp"
 
@@ -38,15 +39,17 @@ struct IntakeStatus {
   std::vector<RobotStatus> robots;
   std::vector<RobotDeparture> departures;  ///< the last few, latest last
   std::vector<ProblemCounter::Entry> problems;
+  /// CPU time so far: taking images from the bus and converting them, and all of the thread [ms].
+  double take_cpu_ms = 0.0, cpu_ms = 0.0;
 };
 
 /// Runs a thread of its own from construction to stop().
 class Intake {
  public:
-  /// `watch` has listened on the participant from its first moment. It and `queue` must outlive the
-  /// intake. Throws InputError for a bad topic or colour.
+  /// `watch` has listened on the participant from its first moment. It, `queue` and `latency` must
+  /// outlive the intake. Throws InputError for a bad topic or colour.
   Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-         const ClassMap& classes, BusWatch& watch, FrameQueue& queue);
+         const ClassMap& classes, BusWatch& watch, FrameQueue& queue, LatencyLog& latency);
   ~Intake();
 
   /// Takes what has arrived until now, hands every frame that it makes to the queue, and closes it.
@@ -76,6 +79,7 @@ class Intake {
   const NodeConfig node_;
   BusWatch& watch_;
   FrameQueue& queue_;
+  LatencyLog& latency_;
   Wakeup wakeup_;
   ColourTable colours_;
   ProblemCounter problems_;
@@ -84,6 +88,7 @@ class Intake {
   std::unique_ptr<TransformInput> tf_;  ///< null when every robot has its own
   std::map<std::string, Robot> robots_;
   std::deque<RobotDeparture> departures_;
+  double departed_take_cpu_ms_ = 0.0;
   FrameMerger<Frame> merger_;
   std::atomic<bool> stopping_{false};
   mutable std::mutex status_mutex_;

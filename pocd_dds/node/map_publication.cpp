@@ -40,17 +40,17 @@ MapPublication::MapPublication(const std::shared_ptr<Participant>& participant,
       requests_(participant, topics::kSnapshotRequest, wakeup),
       budget_(1e6 * config.node.map_rate_mb_s) {}
 
-void MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
+bool MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
   send_waiting();
   const auto time = std::chrono::steady_clock::now();
   // When the network does not keep up, steps become fewer and larger instead of a queue that grows.
   const bool due =
       std::chrono::duration<double>(time - last_sent_).count() >= config_.node.map_period_s &&
       deltas_waiting_.empty() && tiles_waiting_.empty();
-  if (!now && !due) return;
+  if (!now && !due) return false;
   last_sent_ = time;
   std::optional<MapDelta> delta = publisher_.update(map);
-  if (!delta) return;
+  if (!delta) return true;
   stamp_ns_ = stamp_ns;
   for (auto& message : delta_messages(*delta, map_id_, stamp_ns, kPartBytes)) {
     deltas_waiting_.push_back(std::move(message));
@@ -60,6 +60,7 @@ void MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
   changed_.insert(delta->removed.begin(), delta->removed.end());
   tiles_waiting_.insert(tiles_waiting_.end(), delta->removed.begin(), delta->removed.end());
   send_waiting();
+  return true;
 }
 
 void MapPublication::send_waiting() {

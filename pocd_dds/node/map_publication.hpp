@@ -27,8 +27,8 @@ class MapPublication {
                  std::uint64_t epoch, Wakeup& wakeup);
 
   /// Makes a step of what has changed, when the period is over and the step before has left, or
-  /// `now`.
-  void send_due(TsdfMap& map, StampNs stamp_ns, bool now);
+  /// `now`. True when it did: all that the map held is in the steps.
+  bool send_due(TsdfMap& map, StampNs stamp_ns, bool now);
   /// What the map is, as far as its deltas have left; `final_version` at the end of a run.
   void send_manifest(std::size_t objects, bool final_version);
   /// One reply for all that wait, when the one before has arrived.
@@ -39,6 +39,8 @@ class MapPublication {
   std::size_t waiting() const {
     return deltas_waiting_.size() + tiles_waiting_.size() + replies_waiting_.size();
   }
+  /// The deltas of all steps have been written.
+  bool deltas_written() const { return deltas_waiting_.empty(); }
   bool wait_acknowledged(std::chrono::milliseconds time);
 
   const MapPublisher& publisher() const { return publisher_; }

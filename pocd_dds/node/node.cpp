@@ -10,6 +10,7 @@
 #include "pocd/common/check.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 #include "pocd_dds/node/frame_log.hpp"
+#include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 #include "pocd_dds/node/object_publication.hpp"
 #include "pocd_dds/node/rival_watch.hpp"
@@ -37,6 +38,7 @@ struct Node::Impl {
       : config(options.config),
         participant(std::make_shared<Participant>(watched(options.bus, watch))),
         pipeline(config.pipeline),
+        latency(options.latency_file),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
         clock(participant, config.node.use_clock, wakeup),
@@ -46,7 +48,7 @@ struct Node::Impl {
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
-        intake(participant, config.node, config.pipeline.classes, watch, queue),
+        intake(participant, config.node, config.pipeline.classes, watch, queue, latency),
         worker([this] { work(); }) {}
 
   ~Impl() {
@@ -67,6 +69,7 @@ struct Node::Impl {
   BusWatch watch;  // outlives the participant
   const std::shared_ptr<Participant> participant;
   PocdPipeline pipeline;  // worker only
+  LatencyLog latency;
   FrameQueue queue;
   Wakeup wakeup;
 
@@ -113,6 +116,8 @@ void Node::Impl::work() {
 
 void Node::Impl::process(const Frame& frame) {
   const auto start = Clock::now();
+  const double cpu_ms = thread_cpu_ms();
+  latency.started(frame.robot, frame.stamp_ns);
   FrameResult result;
   try {
     result = pipeline.process_frame(frame);
@@ -120,7 +125,9 @@ void Node::Impl::process(const Frame& frame) {
     result.accepted = false;
     result.warnings.push_back(error.what());
   }
+  latency.processed(frame.robot, frame.stamp_ns);
   const std::lock_guard<std::mutex> lock(mutex);
+  counts.pipeline_cpu_ms += thread_cpu_ms() - cpu_ms;
   busy_ms += 1e3 * seconds(Clock::now() - start);
   ++busy_frames;
   ++counts.processed;
@@ -138,8 +145,11 @@ void Node::Impl::process(const Frame& frame) {
 
 void Node::Impl::publish(bool now) {
   const std::lock_guard<std::mutex> lock(mutex);
+  const double cpu_ms = thread_cpu_ms();
   objects.send_due(now);
-  map.send_due(pipeline.map(), counts.stamp_ns, now);
+  if (map.send_due(pipeline.map(), counts.stamp_ns, now)) latency.in_step();
+  if (map.deltas_written()) latency.written();
+  counts.publishing_cpu_ms += thread_cpu_ms() - cpu_ms;
 }
 
 void Node::Impl::look_for_rivals(IntakeStatus& input) {
@@ -162,6 +172,10 @@ void Node::Impl::send_status(const std::string& state) {
   counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
   busy_ms = 0.0;
   busy_frames = 0;
+  counts.latency_ms = latency.take_longest_ms();
+  counts.intake_cpu_ms = input.cpu_ms;
+  counts.take_cpu_ms = input.take_cpu_ms;
+  counts.process_cpu_ms = process_cpu_ms();
   counts.write_failures = objects.failures() + map.failures() + frames.failures();
   counts.map = map.traffic();
   counts.map_version = map.publisher().version();
@@ -186,6 +200,7 @@ void Node::Impl::turn() {
     const std::lock_guard<std::mutex> lock(mutex);
     map.answer_requests();
     map.send_waiting();
+    if (map.deltas_written()) latency.written();
     map_waits = map.waiting() > 0;
   }
   const auto now = Clock::now();

@@ -13,7 +13,8 @@ namespace pocd::dds {
 struct NodeOptions {
   BusOptions bus;
   NodeFile config;
-  std::uint64_t epoch = 0;  ///< names this run in every identifier; never 0, never used twice
+  std::uint64_t epoch = 0;   ///< names this run in every identifier; never 0, never used twice
+  std::string latency_file;  ///< CSV of the time that each frame took; empty: none
 };
 
 /// Owns participant, intake thread and worker thread.

@@ -54,7 +54,8 @@ Delivery delivery_of(const TopicSpec& spec, bool lossless, const Delivery& inste
 
 RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
                        const RobotConfig& robot, const ColourTable& colours,
-                       const TransformTree& shared, ProblemCounter& problems, Wakeup& wakeup)
+                       const TransformTree& shared, ProblemCounter& problems, Wakeup& wakeup,
+                       LatencyLog& latency)
     : robot_(robot),
       map_frame_(node.map_frame),
       lossless_(node.lossless),
@@ -62,6 +63,7 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
       camera_frame_(robot.camera_frame),
       colours_(colours),
       problems_(problems),
+      latency_(latency),
       transforms_(nanoseconds(node.max_pose_gap_s), 1000, &shared),
       synchronizer_(synchronizer_config(node, robot), transforms_),
       tf_(node.topics.own_tf() ? std::make_unique<TransformInput>(
@@ -120,7 +122,7 @@ void RobotInput::drain_camera_info() {
     if (camera.problem) {
       problems_.count(camera_info_.topic(), *camera.problem);
     } else if (!synchronizer_.add_camera_info(to_stamp(info.header().stamp()), *camera.value)) {
-      problems_.count(camera_info_.topic(), backwards(info.header()));
+      problems_.count(camera_info_.topic(), backwards(to_stamp(info.header().stamp())));
     }
   }
 }
@@ -147,48 +149,62 @@ void RobotInput::drain_poses() {
 }
 
 void RobotInput::drain_images(Stream stream, ImageReader& reader) {
-  sensor_msgs::msg::Image message;
+  ConvertedImage converted;
+  ImageVisit visit{
+      [&](const recording::RosImage& message) { converted = convert(stream, message); }};
   SampleMeta meta;
   while (true) {
     const bool enough = stream == Stream::kDepth && synchronizer_.pending() >= kHoldDepth;
     if (lossless_ && enough && !source_left_) return;
-    if (!reader.take(message, meta)) return;
+    const double before_ms = thread_cpu_ms();
+    const bool taken = reader.take(visit, meta);
+    take_cpu_ms_ += thread_cpu_ms() - before_ms;
+    if (!taken) return;
     if (!meta.valid) continue;
     heard(stream);
     images_ += stream == Stream::kDepth;
-    add_image(stream, message, reader.topic());
+    add_image(stream, std::move(converted), meta.received_ns, reader.topic());
   }
 }
 
-void RobotInput::add_image(Stream stream, const sensor_msgs::msg::Image& message,
-                           const std::string& topic) {
-  cv::Mat image;
-  std::optional<InputProblem> problem;
+RobotInput::ConvertedImage RobotInput::convert(Stream stream,
+                                               const recording::RosImage& message) const {
+  ConvertedImage converted;
+  converted.header = message.header;
+  const ImageView view = view_of(message);
   if (stream == Stream::kSegmentation) {
-    Checked<LabelImage> labels = labels_from(message, colours_);
-    problem = labels.problem;
-    if (labels.value) {
-      image = labels.value->labels;
-      if (labels.value->unknown_pixels > 0) {
-        problems_.count(topic, {InputReason::kUnknownColour, "a colour of no class became class 0"},
-                        labels.value->unknown_pixels);
-      }
-    }
+    Checked<LabelImage> labels = label_image(view, colours_);
+    converted.problem = std::move(labels.problem);
+    if (!labels.value) return converted;
+    converted.image = std::move(labels.value->labels);
+    converted.unknown_pixels = labels.value->unknown_pixels;
   } else {
-    Checked<cv::Mat> checked = stream == Stream::kDepth ? depth_from(message) : color_from(message);
-    problem = checked.problem;
-    if (checked.value) image = *checked.value;
+    Checked<cv::Mat> image = stream == Stream::kDepth ? depth_image(view) : color_image(view);
+    converted.problem = std::move(image.problem);
+    if (image.value) converted.image = std::move(*image.value);
   }
-  if (problem) {
-    problems_.count(topic, *problem);
+  return converted;
+}
+
+void RobotInput::add_image(Stream stream, ConvertedImage&& converted, std::int64_t received_ns,
+                           const std::string& topic) {
+  if (converted.problem) {
+    problems_.count(topic, *converted.problem);
     return;
+  }
+  if (converted.unknown_pixels > 0) {
+    problems_.count(topic, {InputReason::kUnknownColour, "a colour of no class became class 0"},
+                    converted.unknown_pixels);
   }
   segmentation_delivers_ = segmentation_delivers_ || stream == Stream::kSegmentation;
   color_delivers_ = color_delivers_ || stream == Stream::kColor;
-  if (stream == Stream::kDepth && !accept_camera_frame(message.header().frame_id(), topic)) return;
-  if (!synchronizer_.add_image(stream, to_stamp(message.header().stamp()), std::move(image))) {
-    problems_.count(topic, backwards(message.header()));
+  const recording::RosHeader& header = converted.header;
+  if (stream == Stream::kDepth && !accept_camera_frame(header.frame_id, topic)) return;
+  if (!synchronizer_.add_image(stream, header.stamp_ns, std::move(converted.image))) {
+    problems_.count(topic, backwards(header.stamp_ns));
+    return;
   }
+  latency_.received(robot_.name, header.stamp_ns, received_ns);
 }
 
 bool RobotInput::accept_camera_frame(const std::string& frame, const std::string& topic) {
@@ -259,9 +275,9 @@ std::string RobotInput::waiting_for() const {
   return synchronizer_.waiting_for();
 }
 
-InputProblem RobotInput::backwards(const std_msgs::msg::Header& header) {
+InputProblem RobotInput::backwards(StampNs stamp_ns) {
   return {InputReason::kStampBackwards,
-          "stamp " + std::to_string(to_stamp(header.stamp())) + " ns is not after the one before"};
+          "stamp " + std::to_string(stamp_ns) + " ns is not after the one before"};
 }
 
 std::vector<Frame> RobotInput::take(bool last_call) {

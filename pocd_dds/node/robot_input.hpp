@@ -11,7 +11,9 @@
 #include "pocd/input/frame.hpp"
 #include "pocd/input/time_synchronizer.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/image_visit.hpp"
 #include "pocd_dds/entities/reader.hpp"
+#include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/node_config.hpp"
 #include "pocd_dds/node/transform_input.hpp"
 #include "sensor_msgsPubSubTypes.h"
@@ -23,11 +25,12 @@ class RobotInput {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `shared` has the transforms of the topics that all robots share. It, `colours`, `problems` and
-  /// `wakeup` must outlive it. Throws InputError naming the topic when there can be no reader.
+  /// `shared` has the transforms of the topics that all robots share. It, `colours`, `problems`,
+  /// `wakeup` and `latency` must outlive it. Throws InputError naming the topic when there can be
+  /// no reader.
   RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
              const RobotConfig& robot, const ColourTable& colours, const TransformTree& shared,
-             ProblemCounter& problems, Wakeup& wakeup);
+             ProblemCounter& problems, Wakeup& wakeup, LatencyLog& latency);
 
   const std::string& name() const { return robot_.name; }
 
@@ -59,23 +62,34 @@ class RobotInput {
   std::uint64_t dropped() const;
   /// Images that the bus says were lost on the way.
   std::uint64_t lost() const;
+  /// CPU time that taking images from the bus and converting them took so far [ms].
+  double take_cpu_ms() const { return take_cpu_ms_; }
   /// What its frames wait for, or go on without; "" when nothing is wrong.
   std::string waiting_for() const;
   const SynchronizerCounts& counts() const { return synchronizer_.counts(); }
 
  private:
-  using ImageReader = Reader<sensor_msgs::msg::ImagePubSubType>;
+  using ImageReader = Reader<ImageVisitType>;
   using Stream = TimeSynchronizer::Stream;
 
   void drain_poses();
   void drain_camera_info();
   void drain_images(Stream stream, ImageReader& reader);
-  void add_image(Stream stream, const sensor_msgs::msg::Image& message, const std::string& topic);
+  /// An image of a stream as the synchroniser takes it, or what is wrong with it.
+  struct ConvertedImage {
+    recording::RosHeader header;
+    cv::Mat image;
+    std::optional<InputProblem> problem;
+    std::uint64_t unknown_pixels = 0;
+  };
+  ConvertedImage convert(Stream stream, const recording::RosImage& message) const;
+  void add_image(Stream stream, ConvertedImage&& converted, std::int64_t received_ns,
+                 const std::string& topic);
   bool accept_camera_frame(const std::string& frame, const std::string& topic);
   void heard(Stream stream);
   void judge_silence();
   std::string topic_of(Stream stream) const;
-  static InputProblem backwards(const std_msgs::msg::Header& header);
+  static InputProblem backwards(StampNs stamp_ns);
 
   RobotConfig robot_;
   const std::string map_frame_;
@@ -84,12 +98,14 @@ class RobotInput {
   std::string camera_frame_;  ///< "" until the first depth image
   const ColourTable& colours_;
   ProblemCounter& problems_;
+  LatencyLog& latency_;
   TransformTree transforms_;
   TimeSynchronizer synchronizer_;
   PoseQuaternion mount_;
   bool had_source_ = false, source_left_ = false;
   std::uint64_t frames_ = 0, images_ = 0;
   std::uint64_t refused_ = 0;
+  double take_cpu_ms_ = 0.0;
   bool segmentation_required_ = false, color_required_ = false;
   bool segmentation_delivers_ = false, color_delivers_ = false;
   std::map<Stream, Clock::time_point> heard_;

@@ -151,6 +151,12 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   add(node, "frames in queue", std::to_string(queued));
   add_memory(node, work.memory);
   add(node, "processing [ms per frame]", std::to_string(work.processing_ms));
+  add(node, "longest from last image to map delta [ms]", std::to_string(work.latency_ms));
+  add(node, "CPU of the pipeline [ms]", std::to_string(work.pipeline_cpu_ms));
+  add(node, "CPU of publishing [ms]", std::to_string(work.publishing_cpu_ms));
+  add(node, "CPU of the intake [ms]", std::to_string(work.intake_cpu_ms));
+  add(node, "CPU of taking images, within the intake [ms]", std::to_string(work.take_cpu_ms));
+  add(node, "CPU of the process [ms]", std::to_string(work.process_cpu_ms));
   add(node, "objects", std::to_string(work.objects));
   add(node, "map version", std::to_string(work.map_version));
   add(node, "map tiles", std::to_string(work.map.tiles));

@@ -58,7 +58,7 @@ TEST_F(PocdMap, WritesEveryFile) {
       "id,class,class_name,stationarity_class,x,y,z,yaw,size_x,size_y,size_z,box_z,stationarity,"
       "alpha,beta,mu,sigma,first_seen_ns,last_seen_ns,observations,last_robot");
   EXPECT_EQ(first_line("out", "events.csv").rfind("sequence,stamp_ns,kind,object_id,", 0), 0u);
-  EXPECT_EQ(first_line("out", "timing.csv"), "frame,stamp_ns,robot,stage,wall_ms");
+  EXPECT_EQ(first_line("out", "timing.csv"), "frame,stamp_ns,robot,stage,wall_ms,cpu_ms");
   EXPECT_EQ(first_line("out", "map.ply"), "ply");
   EXPECT_FALSE(cv::imread((folder_.path() / "out/birdseye.png").string()).empty());
 

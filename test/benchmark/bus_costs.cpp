@@ -107,6 +107,14 @@ class Run {
     while (publisher_->map().waiting() > 0) serve_for(0.1, 0);
     std::printf("| memory of publication and history | %.0f MB; pipeline and voxels %.0f MB |\n",
                 process_cost(0).memory_mb - before.memory_mb, before.memory_mb);
+    dds::SurfacePoints surface(config_.pipeline.map.voxel_size_m,
+                               config_.pipeline.map.truncation_m());
+    std::vector<TileKey> keys;
+    for (const auto& [key, tile] : publisher_->map().publisher().tiles()) keys.push_back(key);
+    surface.apply(publisher_->map().publisher().tiles(), keys, {});
+    constexpr double kPointBytes = 24.0;
+    std::printf("| rt/pocd/surface, while somebody listens | %.1f MB each time |\n",
+                1e-6 * kPointBytes * static_cast<double>(surface.size()));
     std::printf(
         "| changed by one robot | %.1f tiles per step of %.1f s, %.1f KB/s; %.1f object states/s, "
         "%.2f events/s |\n",

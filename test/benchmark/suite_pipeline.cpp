@@ -13,16 +13,11 @@ namespace {
 /// The slow peers see every so many frames.
 constexpr std::size_t kPeerStride = 10;
 
-/// What one pipeline took: the whole by both clocks, its stages by the wall clock.
+/// What one pipeline took, whole and by stage.
 struct Times {
   Series total;
   std::vector<std::string> order;
   std::map<std::string, Series> stage;
-};
-
-/// The stages before objects come into play, called by hand: CPU time of each.
-struct FrontEnd {
-  Series organize, clean, cluster, clean_and_cluster;
 };
 
 struct Peers {
@@ -34,44 +29,16 @@ void process(PocdPipeline& pipeline, const Frame& frame, std::size_t i, Times& t
   time_into(times.total, i, [&] { result = pipeline.process_frame(frame); });
   for (const StageTiming& t : result.timings) {
     if (times.stage.find(t.stage) == times.stage.end()) times.order.push_back(t.stage);
-    times.stage[t.stage].add(i, 0.0, t.wall_ms);
+    times.stage[t.stage].add(i, t.cpu_ms, t.wall_ms);
   }
 }
 
-class FrontEndRun {
- public:
-  explicit FrontEndRun(const PipelineConfig& config) : config_(config), table_(config.classes) {}
-
-  void run(const Frame& frame, std::size_t i, FrontEnd& times) {
-    const SegmentationConfig& segmentation = config_.segmentation;
-    time_into(times.organize, i, [&] {
-      organize(frame, segmentation.stride, config_.map.max_depth_m, config_.classes, table_, pool_,
-               cloud_);
-    });
-    const auto clean = [&] {
-      segment_planes(cloud_, segmentation, config_.depth_noise, planes_);
-      vote_planes(planes_, segmentation.majority_share, cloud_);
-      ground_.update(planes_, segmentation, config_.depth_noise, cloud_);
-    };
-    const auto cluster = [&] {
-      extract_observations(segmentation, config_.depth_noise, config_.map.voxel_size_m, planes_,
-                           cloud_, observations_);
-    };
-    time_into(times.clean_and_cluster, i, [&] {
-      time_into(times.clean, i, clean);
-      time_into(times.cluster, i, cluster);
-    });
-  }
-
- private:
-  PipelineConfig config_;
-  ClassTable table_;
-  ThreadPool pool_{1};
-  GroundModel ground_;
-  OrganizedCloud cloud_;
-  PlaneSegmentation planes_;
-  Observations observations_;
-};
+/// CPU time of two stages together, by frame.
+std::vector<double> both(const Times& times, const char* a, const char* b) {
+  std::vector<double> sum = times.stage.at(a).cpu();
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += times.stage.at(b).cpu()[i];
+  return sum;
+}
 
 void run_peers(const FrameSet& set, const Frame& frame, std::size_t sample, Peers& peers) {
   const SegmentationConfig& segmentation = set.config.segmentation;
@@ -106,42 +73,34 @@ std::vector<double> sampled(const std::vector<double>& values) {
   return some;
 }
 
-void write_stages(const FrameSet& set, const Times& one, const Times& two, const FrontEnd& front,
-                  std::ostream& out) {
+void write_stages(const FrameSet& set, const Times& one, const Times& two, std::ostream& out) {
   Table table(
       "process_frame by stage, " + set.name + ", " + std::to_string(set.frames.size()) + " frames",
       {"stage", "CPU 1 thread: median", "p95", "p99", "max [ms]", "wall 1 thread: median", "p95",
-       "max [ms]", "wall 2 threads: median", "p95", "max [ms]"});
-  const auto row = [&](const std::string& stage, const std::vector<double>* cpu,
-                       const std::vector<double>& wall_1, const std::vector<double>& wall_2) {
+       "max [ms]", "wall 2 threads: median", "p95", "max [ms]", "CPU 2 threads: median [ms]",
+       "speed-up"});
+  const auto row = [&](const std::string& stage, const Series& s1, const Series& s2) {
     std::vector<std::string> cells{stage};
     for (const double share : {0.5, 0.95, 0.99, 1.0}) {
-      cells.push_back(cpu ? number(quantile(*cpu, share)) : "");
+      cells.push_back(number(quantile(s1.cpu(), share)));
     }
-    for (const auto* wall : {&wall_1, &wall_2}) {
-      for (const double share : {0.5, 0.95, 1.0}) cells.push_back(number(quantile(*wall, share)));
+    for (const Series* s : {&s1, &s2}) {
+      for (const double share : {0.5, 0.95, 1.0}) {
+        cells.push_back(number(quantile(s->wall(), share)));
+      }
     }
+    cells.push_back(number(median(s2.cpu())));
+    cells.push_back(number(median(s1.wall()) / median(s2.wall())));
     table.row(std::move(cells));
   };
-  const std::map<std::string, const std::vector<double>*> by_hand{
-      {"organize", &front.organize.cpu()},
-      {"clean", &front.clean.cpu()},
-      {"cluster", &front.cluster.cpu()}};
-  for (const std::string& stage : one.order) {
-    const auto cpu = by_hand.find(stage);
-    row(stage, cpu == by_hand.end() ? nullptr : cpu->second, one.stage.at(stage).wall(),
-        two.stage.at(stage).wall());
-  }
-  row("process_frame", &one.total.cpu(), one.total.wall(), two.total.wall());
+  for (const std::string& stage : one.order) row(stage, one.stage.at(stage), two.stage.at(stage));
+  row("process_frame", one.total, two.total);
   const auto& total = one.total.cpu();
-  table.note("CPU p99 is " + number(quantile(total, 0.99) / median(total)) +
-             " times the median; with 2 threads the CPU median is " +
-             number(median(two.total.cpu())) + " ms. The first three stages were timed by hand.");
+  table.note("CPU p99 is " + number(quantile(total, 0.99) / median(total)) + " times the median.");
   table.write(out);
 }
 
-void write_peers(const FrameSet& set, const Times& one, const FrontEnd& front, const Peers& peers,
-                 std::ostream& out) {
+void write_peers(const FrameSet& set, const Times& one, const Peers& peers, std::ostream& out) {
   Table table("Beside its peers, " + set.name + ", CPU of one thread, medians",
               {"what", "ours [ms]", "peer", "peer [ms]", "ours / peer", "peer / ours"});
   const auto compare = [&](const std::string& what, const std::vector<double>& ours,
@@ -152,17 +111,19 @@ void write_peers(const FrameSet& set, const Times& one, const FrontEnd& front, c
   };
   compare("process_frame", one.total.cpu(), "OpenCV hash TSDF, integration alone",
           peers.hash_tsdf.cpu());
-  const auto clean_cluster = sampled(front.clean_and_cluster.cpu());
+  const auto clean_cluster = sampled(both(one, "clean", "cluster"));
+  compare("map (owners, integration)", one.stage.at("map").cpu(), "OpenCV hash TSDF",
+          peers.hash_tsdf.cpu());
   compare("clean + cluster", clean_cluster, "PCL voxel grid 2 cm, RANSAC, clusters",
           peers.pcl_2cm.cpu());
   compare("clean + cluster", clean_cluster, "PCL voxel grid 5 cm, RANSAC, clusters",
           peers.pcl_5cm.cpu());
-  compare("organize", sampled(front.organize.cpu()), "cv::rgbd::depthTo3d (camera frame)",
+  compare("organize", sampled(one.stage.at("organize").cpu()), "cv::rgbd::depthTo3d (camera frame)",
           peers.points.cpu());
   std::vector<double> planes = peers.planes.cpu();
   for (std::size_t i = 0; i < planes.size(); ++i) planes[i] += peers.normals.cpu()[i];
-  compare("clean", sampled(front.clean.cpu()), "cv::rgbd normals and planes", planes);
-  compare("cluster", sampled(front.cluster.cpu()),
+  compare("clean", sampled(one.stage.at("clean").cpu()), "cv::rgbd normals and planes", planes);
+  compare("cluster", sampled(one.stage.at("cluster").cpu()),
           "edge mask, cv::connectedComponents (labels only)", peers.components.cpu());
   if (set.config.segmentation.cluster_tolerance_m < 0.1) {
     table.note("PCL's grids are finer here, to fit the smaller cluster tolerance.");
@@ -177,24 +138,19 @@ void run_pipeline(const FrameSet& set, const SuiteOptions& options, std::ostream
   config_1.threads = 1;
   config_2.threads = 2;
   Times one, two;
-  FrontEnd front;
   Peers peers;
   for (int pass = 0; pass < options.passes; ++pass) {
     PocdPipeline pipeline_1(config_1), pipeline_2(config_2);
     HashTsdf hash(set.config.map);
-    FrontEndRun front_run(set.config);
     for (std::size_t i = 0; i < set.frames.size(); ++i) {
       const Frame& frame = set.frames[i];
-      for (std::size_t turn = 0; turn < 4; ++turn) {  // nobody is always the first
-        switch ((i + turn) % 4) {
+      for (std::size_t turn = 0; turn < 3; ++turn) {  // nobody is always the first
+        switch ((i + turn) % 3) {
           case 0:
             process(pipeline_1, frame, i, one);
             break;
           case 1:
             process(pipeline_2, frame, i, two);
-            break;
-          case 2:
-            front_run.run(frame, i, front);
             break;
           default:
             if (HashTsdf::available()) {
@@ -205,8 +161,8 @@ void run_pipeline(const FrameSet& set, const SuiteOptions& options, std::ostream
       if (i % kPeerStride == 0) run_peers(set, frame, i / kPeerStride, peers);
     }
   }
-  write_stages(set, one, two, front, out);
-  write_peers(set, one, front, peers, out);
+  write_stages(set, one, two, out);
+  write_peers(set, one, peers, out);
 }
 
 }  // namespace pocd::bench

@@ -7,11 +7,43 @@
 #include "pocd/common/check.hpp"
 #include "pocd/common/random.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/image_visit.hpp"
+#include "sensor_msgsPubSubTypes.h"
 
 namespace pocd::dds {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// The message as it is on the bus.
+std::unique_ptr<eprosima::fastrtps::rtps::SerializedPayload_t> payload_of(
+    const sensor_msgs::msg::Image& message) {
+  sensor_msgs::msg::Image copy = message;
+  sensor_msgs::msg::ImagePubSubType type;
+  auto payload = std::make_unique<eprosima::fastrtps::rtps::SerializedPayload_t>(
+      type.getSerializedSizeProvider(&copy)());
+  EXPECT_TRUE(type.serialize(&copy, payload.get()));
+  return payload;
+}
+
+/// What `check` says of it where it lies in a payload.
+template <class Check>
+auto visited(const sensor_msgs::msg::Image& message, const Check& check) {
+  std::optional<decltype(check(ImageView{}))> result;
+  ImageVisit visit{[&](const recording::RosImage& seen) { result = check(view_of(seen)); }};
+  EXPECT_TRUE(ImageVisitType().deserialize(payload_of(message).get(), &visit));
+  return *result;
+}
+Checked<cv::Mat> depth_from(const sensor_msgs::msg::Image& message) {
+  return visited(message, depth_image);
+}
+Checked<cv::Mat> color_from(const sensor_msgs::msg::Image& message) {
+  return visited(message, color_image);
+}
+Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& message,
+                                const ColourTable& colours) {
+  return visited(message, [&](const ImageView& view) { return label_image(view, colours); });
+}
 
 sensor_msgs::msg::Image image(const std::string& encoding, std::uint32_t pixel_bytes) {
   sensor_msgs::msg::Image message;
@@ -128,6 +160,56 @@ TEST(LabelsFrom, ColoursBecomeClassesAndUnknownOnesAreCounted) {
     EXPECT_EQ(labels.value->labels.at<std::uint16_t>(0, 2), 0);
     EXPECT_EQ(labels.value->unknown_pixels, 10u);  // the other ones are black, no class either
   }
+}
+
+TEST(ImageVisit, RefusesEveryShorterPayload) {
+  auto message = image("16UC1", 2);
+  message.header().frame_id("camera");
+  const auto whole = payload_of(message);
+  int visits = 0;
+  ImageVisit visit{[&](const recording::RosImage& seen) {
+    ++visits;
+    EXPECT_EQ(seen.header.frame_id, "camera");
+    EXPECT_EQ(seen.size, 24u);
+  }};
+  const std::uint32_t length = whole->length;
+  // The padding behind the last field is nobody's.
+  while (whole->length > 0 && ImageVisitType().deserialize(whole.get(), &visit)) --whole->length;
+  EXPECT_EQ(visits, static_cast<int>(length - whole->length));
+  EXPECT_GE(visits, 1);
+  EXPECT_LE(visits, 4);
+  const int all = visits;
+  for (; whole->length > 0; --whole->length) {
+    EXPECT_FALSE(ImageVisitType().deserialize(whole.get(), &visit));
+  }
+  EXPECT_EQ(visits, all);
+}
+
+TEST(ImagesFrom, AMaskOfBytesAndOneOfWordsAreTheSameClasses) {
+  const ColourTable colours{ClassMap{}};
+  auto narrow = image("mono8", 1), wide = image("mono16", 2);
+  for (std::size_t i = 0; i < 12; ++i) narrow.data()[i] = wide.data()[2 * i] = std::uint8_t(20 * i);
+  const Checked<LabelImage> a = labels_from(narrow, colours), b = labels_from(wide, colours);
+  ASSERT_TRUE(a.value && b.value);
+  ASSERT_EQ(a.value->labels.type(), CV_16UC1);
+  ASSERT_EQ(b.value->labels.type(), CV_16UC1);
+  for (int i = 0; i < 12; ++i) {
+    EXPECT_EQ(a.value->labels.at<std::uint16_t>(i / 4, i % 4),
+              b.value->labels.at<std::uint16_t>(i / 4, i % 4));
+  }
+  EXPECT_EQ(a.value->labels.at<std::uint16_t>(2, 3), 220);
+}
+
+TEST(ImagesFrom, RedGreenBlueIsTurnedRound) {
+  auto message = image("rgb8", 3);
+  message.step(13);  // a row of 12 bytes, and one of padding
+  message.data().assign(39, 0);
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t i = 0; i < 12; ++i) message.data()[13 * row + i] = std::uint8_t(50 * row + i);
+  }
+  const Checked<cv::Mat> color = color_from(message);
+  ASSERT_TRUE(color.value);
+  EXPECT_EQ(color.value->at<cv::Vec3b>(2, 1), cv::Vec3b(105, 104, 103));
 }
 
 TEST(ColourTable, RefusesColoursThatAreNone) {

@@ -19,11 +19,17 @@ TEST(Outside, ExampleBuildsAgainstTheInstalledPackageAndFollowsTheMap) {
   const TestDomain domain;
   Process node(node_command(domain, {"--lossless"}));
   ASSERT_EQ(run_command(play_command(domain, {"--max-frames", "40"})).exit_code, 0);
-  const CommandResult followed =
-      run_command({build + "/follow_map", domain.text(), "100", "100", "100"});
-  EXPECT_EQ(followed.exit_code, 0) << followed.out << followed.err;
-  EXPECT_NE(followed.out.find("that place is not near any surface"), std::string::npos)
-      << followed.out;
+  // In the face of the box in the east, before it, and far away.
+  const std::pair<std::vector<std::string>, std::string> places[] = {
+      {{"2.0", "0.2", "0.5"}, "occupied"},
+      {{"1.85", "0.2", "0.5"}, "free"},
+      {{"100", "100", "100"}, "not near any surface"}};
+  for (const auto& [place, expected] : places) {
+    const CommandResult followed =
+        run_command({build + "/follow_map", domain.text(), place[0], place[1], place[2]});
+    EXPECT_EQ(followed.exit_code, 0) << followed.out << followed.err;
+    EXPECT_NE(followed.out.find("that place is " + expected), std::string::npos) << followed.out;
+  }
   node.signal(SIGINT);
   EXPECT_EQ(node.wait().exit_code, 0);
 }

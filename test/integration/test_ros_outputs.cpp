@@ -2,8 +2,11 @@
 // replay.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <set>
 
+#include "diagnostic_msgsPubSubTypes.h"
 #include "map_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
 #include "pocd_dds/bridge/conversions.hpp"
@@ -27,7 +30,8 @@ class Tool {
         updates_(bus, dds::topics::kOccupancyUpdates, taker_.wakeup()),
         surface_(bus, dds::topics::kSurface, taker_.wakeup()),
         markers_(bus, dds::topics::kMarkers, taker_.wakeup()),
-        obstacles_(bus, dds::topics::kRmfObstacles, taker_.wakeup()) {
+        obstacles_(bus, dds::topics::kRmfObstacles, taker_.wakeup()),
+        diagnostics_(bus, dds::topics::kDiagnostics, taker_.wakeup()) {
     taker_.start([this] { take(); });
   }
   void stop() { taker_.stop(); }
@@ -46,6 +50,7 @@ class Tool {
   std::map<std::int32_t, rmf_obstacle_msgs::msg::Obstacle> obstacles;
   std::set<std::int32_t> obstacles_deleted;
   std::vector<StampNs> obstacle_stamps;
+  std::map<std::string, double> most;  ///< of each number in the diagnostics
 
  private:
   void take() {
@@ -67,6 +72,15 @@ class Tool {
           markers_deleted.insert(marker.id());
       }
     }
+    diagnostic_msgs::msg::DiagnosticArray diagnostics;
+    while (diagnostics_.take(diagnostics, meta)) {
+      for (const auto& status : diagnostics.status()) {
+        for (const auto& entry : status.values()) {
+          double& value = most[entry.key()];
+          value = std::max(value, std::atof(entry.value().c_str()));
+        }
+      }
+    }
     rmf_obstacle_msgs::msg::Obstacles list;
     while (obstacles_.take(list, meta)) {
       obstacle_stamps.push_back(dds::to_stamp(list.header().stamp()));
@@ -85,6 +99,7 @@ class Tool {
   dds::Reader<sensor_msgs::msg::PointCloud2PubSubType> surface_;
   dds::Reader<visualization_msgs::msg::MarkerArrayPubSubType> markers_;
   dds::Reader<rmf_obstacle_msgs::msg::ObstaclesPubSubType> obstacles_;
+  dds::Reader<diagnostic_msgs::msg::DiagnosticArrayPubSubType> diagnostics_;
 };
 
 TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
@@ -105,6 +120,18 @@ TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
       kGenerous));
   tool.stop();
   const MirrorContents contents = mirror.contents();
+
+  // What the map costs on the bus: all tiles in under a minute, each a few hundred bytes.
+  double bytes = 0.0;
+  for (const auto& [key, tile] : contents.tiles) bytes += static_cast<double>(tile.payload.size());
+  EXPECT_GT(tool.most["map bytes per second"], bytes / 60);
+  EXPECT_GE(tool.most["map bytes published"], bytes);
+  std::set<std::pair<int, int>> columns;
+  for (const auto& [key, tile] : contents.tiles) columns.insert({key.x, key.y});
+  const double side_m = kTileSide * contents.voxel_size_m;
+  const double per_m2 = bytes / (static_cast<double>(columns.size()) * side_m * side_m);
+  EXPECT_GT(tool.most["map bytes per m2"], 0.5 * per_m2);
+  EXPECT_LT(tool.most["map bytes per m2"], 2.0 * per_m2);
 
   // The grid and the surface are those of the map that the mirror has proven to be the publisher's.
   std::vector<MapTile> tiles;

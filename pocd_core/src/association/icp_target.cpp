@@ -18,6 +18,7 @@ constexpr std::array<std::array<int, 2>, 9> kRows = {
     {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 
 float square(float x) { return x * x; }
+float just_beyond(float x) { return std::nextafter(x, 2.0f * x); }
 
 }  // namespace
 
@@ -50,7 +51,27 @@ IcpTarget::Level IcpTarget::make_level(const std::vector<Eigen::Vector3f>& point
     level.points[slot] = points[i];
     level.normals[slot] = normals[i];
   }
+  level.note_rows();
   return level;
+}
+
+void IcpTarget::Level::note_rows() {
+  rows.assign(begin.size() - 1, 0);
+  std::array<int, kRows.size()> step;  // from a cell to the middle of its n-th row
+  for (std::size_t n = 0; n < kRows.size(); ++n) {
+    step[n] = (kRows[n][1] * cells.y() + kRows[n][0]) * cells.x();
+  }
+  for (std::size_t c = 0; c < rows.size(); ++c) {
+    if (begin[c] == begin[c + 1]) continue;
+    for (std::size_t n = 0; n < kRows.size(); ++n) {
+      // The border keeps the cells around a point within the grid.
+      const std::size_t around = c - static_cast<std::size_t>(static_cast<std::ptrdiff_t>(step[n]));
+      const auto bit = static_cast<std::uint16_t>(1u << n);
+      for (const std::size_t cell : {around - 1, around, around + 1}) {
+        rows[cell] = static_cast<std::uint16_t>(rows[cell] | bit);
+      }
+    }
+  }
 }
 
 IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inlier_distance_m,
@@ -91,22 +112,33 @@ IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inl
 }
 
 void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbour& best) {
-  const Eigen::Array3i cell = level.cell_of(query);
-  if ((cell < 1).any() || (cell > level.cells - 2).any()) return;
-  const Eigen::Array3f below = query.array() - (cell - kBorder).cast<float>() * level.cell_m;
-  const Eigen::Array3f above = level.cell_m - below;
-  const float gap_y[3] = {square(below.y()), 0.0f, square(above.y())};
-  const float gap_z[3] = {square(below.z()), 0.0f, square(above.z())};
-  const int center = level.flat_index(cell);
-  const int row_y = level.cells.x(), row_z = level.cells.x() * level.cells.y();
-  const std::uint32_t* const begin = level.begin.data();
+  // What cell_of() does, four at a time, for the sake of vector instructions.
+  const Eigen::Array4f point(query.x(), query.y(), query.z(), 0.0f);
+  const Eigen::Array4f floor = (point / level.cell_m).floor().max(-1e6f).min(1e6f);
+  const Eigen::Array4i cell = floor.cast<int>() + kBorder;
+  const bool inside = cell.x() >= 1 && cell.y() >= 1 && cell.z() >= 1 &&
+                      cell.x() <= level.cells.x() - 2 && cell.y() <= level.cells.y() - 2 &&
+                      cell.z() <= level.cells.z() - 2;
+  if (!inside) return;
+  const int center = level.flat_index(cell.head<3>());
+  if (level.rows[static_cast<std::size_t>(center)] == 0) return;
+  const Eigen::Array4f below = point - floor * level.cell_m;
+  const Eigen::Array4f above = level.cell_m - below;
+  const float y0 = square(below.y()), y2 = square(above.y());
+  const float z0 = square(below.z()), z2 = square(above.z());
+  const int y = level.cells.x(), z = level.cells.x() * level.cells.y();
+  // In the order of kRows: how far a row is from the query at least, and where its middle is.
+  const float gap[] = {0.0f, y0, y2, z0, z2, y0 + z0, y2 + z0, y0 + z2, y2 + z2};
+  const int step[] = {0, -y, y, -z, z, -y - z, y - z, z - y, y + z};
+  const std::uint32_t* const begin = level.begin.data() + center;
   const Eigen::Vector3f* const points = level.points.data();
   const auto none = static_cast<std::uint32_t>(level.points.size());
   std::uint32_t found = none;
   float nearest = best.squared_distance_m2;
-  for (const auto& [dy, dz] : kRows) {
-    if (gap_y[dy + 1] + gap_z[dz + 1] >= nearest) continue;
-    const int middle = center + dy * row_y + dz * row_z;
+  for (unsigned rows = level.rows[static_cast<std::size_t>(center)]; rows != 0; rows &= rows - 1) {
+    const int n = __builtin_ctz(rows);
+    if (gap[n] >= nearest) continue;
+    const std::ptrdiff_t middle = step[n];
     const std::uint32_t end = begin[middle + 2];
     for (std::uint32_t i = begin[middle - 1]; i < end; ++i) {
       const float d2 = (points[i] - query).squaredNorm();
@@ -121,11 +153,21 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
   best.normal = level.normals[found];
 }
 
+std::optional<IcpTarget::Neighbour> IcpTarget::nearest_inlier(const Eigen::Vector3f& query) const {
+  Neighbour best;
+  const double limit2 = inlier_distance_m_ * inlier_distance_m_;
+  // A little more, so that no rounding leaves one out.
+  const float beyond = static_cast<float>(1.001 * limit2);
+  best.squared_distance_m2 = beyond;
+  search(levels_.front(), query, best);  // has all points, in cells that are not smaller
+  if (best.squared_distance_m2 == beyond || best.squared_distance_m2 > limit2) return std::nullopt;
+  return best;
+}
+
 std::optional<IcpTarget::Neighbour> IcpTarget::nearest(const Eigen::Vector3f& query) const {
   Neighbour best;
-  const float limit = square(static_cast<float>(max_correspondence_m_));
   // Points on the limit itself belong to it.
-  best.squared_distance_m2 = std::nextafter(limit, 2.0f * limit);
+  best.squared_distance_m2 = just_beyond(square(static_cast<float>(max_correspondence_m_)));
   const float none = best.squared_distance_m2;
   for (const Level& level : levels_) {
     search(level, query, best);

@@ -151,13 +151,12 @@ void evaluate(const IcpTarget& target, const Source& source, const State& state,
               IcpResult& result) {
   const Eigen::Matrix3f rotation = state.rotation.cast<float>();
   const Eigen::Vector3f centroid = state.centroid.cast<float>();
-  const double limit2 = target.inlier_distance_m() * target.inlier_distance_m();
   std::size_t inliers = 0;
   double sum = 0.0;
   for (const auto& p : source.points) {
     const Eigen::Vector3f x = centroid + rotation * p;
-    const auto match = target.nearest(x);
-    if (!match || match->squared_distance_m2 > limit2) continue;
+    const auto match = target.nearest_inlier(x);
+    if (!match) continue;
     ++inliers;
     const double residual = match->normal.dot(x - match->point);
     sum += residual * residual;

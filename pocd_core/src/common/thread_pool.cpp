@@ -1,7 +1,10 @@
 #include "pocd/common/thread_pool.hpp"
 
+#include <time.h>
+
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -11,20 +14,52 @@
 #include "pocd/common/check.hpp"
 
 namespace pocd {
+namespace {
+
+/// How long a thread looks before it lies down to sleep: about as long as being woken up takes.
+constexpr std::chrono::microseconds kLook{100};
+
+void relax() {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#endif
+}
+
+/// Waits a little for `condition`; it may still be false afterwards.
+template <class Condition>
+void look_for(const Condition& condition) {
+  const auto end = std::chrono::steady_clock::now() + kLook;
+  while (!condition() && std::chrono::steady_clock::now() < end) {
+    for (int i = 0; i < 16; ++i) relax();
+  }
+}
+
+double thread_cpu_ms() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+}  // namespace
 
 struct ThreadPool::Impl {
   using Piece = std::function<void(std::size_t, std::size_t)>;
 
   std::vector<std::thread> workers;
+  bool look = true;  ///< there is a processor for each thread
+  // Changed under the mutex only; atomic where somebody looks without it.
   std::mutex mutex;
   std::condition_variable wake, done;
   const Piece* piece = nullptr;
   std::size_t count = 0, grain = 1;
-  std::atomic<std::size_t> next{0};
-  std::uint64_t job = 0;
-  std::size_t running = 0;
-  bool stop = false;
+  bool open = false;  ///< workers may still join the job
+  std::atomic<std::uint64_t> job{0}, roused{0};
+  std::atomic<std::size_t> inside{0};  ///< workers that have joined and not left
+  std::atomic<bool> stop{false};
+  double worker_cpu_ms = 0.0;
   std::exception_ptr error;
+
+  std::atomic<std::size_t> next{0};
 
   void drain() {
     for (;;) {
@@ -40,22 +75,59 @@ struct ThreadPool::Impl {
   }
 
   void work() {
-    std::uint64_t seen = 0;
-    std::unique_lock<std::mutex> lock(mutex);
+    std::uint64_t seen = 0, seen_roused = 0;
+    const auto called = [&] { return stop || job != seen; };
     for (;;) {
-      wake.wait(lock, [&] { return stop || job != seen; });
+      if (look) look_for(called);
+      std::unique_lock<std::mutex> lock(mutex);
+      wake.wait(lock, [&] { return called() || roused != seen_roused; });
       if (stop) return;
+      seen_roused = roused;
+      if (job == seen) continue;
       seen = job;
+      if (!open) continue;  // the others were done before this one woke up
+      ++inside;
       lock.unlock();
+      const double before_ms = thread_cpu_ms();
       drain();
+      const double spent_ms = thread_cpu_ms() - before_ms;
       lock.lock();
-      if (--running == 0) done.notify_one();
+      worker_cpu_ms += spent_ms;
+      if (--inside == 0) done.notify_one();
     }
+  }
+
+  void begin(std::size_t n, std::size_t size, const Piece& what) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      piece = &what;
+      count = n;
+      grain = size;
+      next = 0;
+      error = nullptr;
+      open = true;
+      ++job;
+    }
+    wake.notify_all();
+  }
+
+  /// Waits for those who have joined, not for those who sleep.
+  void end() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      open = false;
+    }
+    const auto left = [&] { return inside == 0; };
+    if (look) look_for(left);
+    std::unique_lock<std::mutex> lock(mutex);
+    done.wait(lock, left);
+    if (error) std::rethrow_exception(error);
   }
 };
 
 ThreadPool::ThreadPool(int threads) : impl_(std::make_unique<Impl>()) {
   POCD_CHECK(threads >= 1);
+  impl_->look = static_cast<int>(std::thread::hardware_concurrency()) >= threads;
   for (int i = 1; i < threads; ++i) impl_->workers.emplace_back([this] { impl_->work(); });
 }
 
@@ -70,6 +142,20 @@ ThreadPool::~ThreadPool() {
 
 int ThreadPool::threads() const { return static_cast<int>(impl_->workers.size()) + 1; }
 
+void ThreadPool::rouse() {
+  if (impl_->workers.empty() || !impl_->look) return;
+  {
+    const std::lock_guard<std::mutex> lock(impl_->mutex);
+    ++impl_->roused;
+  }
+  impl_->wake.notify_all();
+}
+
+double ThreadPool::worker_cpu_ms() const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->worker_cpu_ms;
+}
+
 void ThreadPool::parallel_for(std::size_t count, std::size_t grain, const Impl::Piece& piece) {
   POCD_CHECK(grain > 0);
   if (impl_->workers.empty() || count <= grain) {
@@ -78,21 +164,9 @@ void ThreadPool::parallel_for(std::size_t count, std::size_t grain, const Impl::
     }
     return;
   }
-  {
-    const std::lock_guard<std::mutex> lock(impl_->mutex);
-    impl_->piece = &piece;
-    impl_->count = count;
-    impl_->grain = grain;
-    impl_->next = 0;
-    impl_->error = nullptr;
-    impl_->running = impl_->workers.size();
-    ++impl_->job;
-  }
-  impl_->wake.notify_all();
+  impl_->begin(count, grain, piece);
   impl_->drain();
-  std::unique_lock<std::mutex> lock(impl_->mutex);
-  impl_->done.wait(lock, [&] { return impl_->running == 0; });
-  if (impl_->error) std::rethrow_exception(impl_->error);
+  impl_->end();
 }
 
 }  // namespace pocd

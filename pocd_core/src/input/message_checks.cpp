@@ -61,6 +61,12 @@ Checked<cv::Mat> copy_of(const ImageView& image, int type) {
   return copy;
 }
 
+/// Samples of a byte each where they lie, not a copy: valid as long as the message.
+cv::Mat bytes_of(const ImageView& image, int type) {
+  return cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width), type,
+                 const_cast<std::uint8_t*>(image.data), image.step);
+}
+
 InputProblem unknown_encoding(const ImageView& image, const char* expected) {
   return {InputReason::kUnknownEncoding,
           "encoding " + quoted(image.encoding) + ", expected " + expected};
@@ -78,10 +84,10 @@ Checked<cv::Mat> color_image(const ImageView& image) {
   if (image.encoding != "rgb8" && image.encoding != "bgr8") {
     return unknown_encoding(image, "rgb8 or bgr8");
   }
-  Checked<cv::Mat> color = copy_of(image, CV_8UC3);
-  if (color.value && image.encoding == "rgb8") {
-    cv::cvtColor(*color.value, *color.value, cv::COLOR_RGB2BGR);
-  }
+  if (image.encoding == "bgr8") return copy_of(image, CV_8UC3);
+  if (auto problem = layout_problem(image, CV_8UC3)) return std::move(*problem);
+  cv::Mat color;
+  cv::cvtColor(bytes_of(image, CV_8UC3), color, cv::COLOR_RGB2BGR);
   return color;
 }
 
@@ -112,9 +118,12 @@ Checked<LabelImage> label_image(const ImageView& image, const ColourTable& colou
   LabelImage result;
   if (encoding == "mono8" || encoding == "8UC1" || encoding == "mono16" || encoding == "16UC1") {
     const bool wide = encoding == "mono16" || encoding == "16UC1";
-    Checked<cv::Mat> labels = copy_of(image, wide ? CV_16UC1 : CV_8UC1);
-    if (!labels.value) return std::move(*labels.problem);
-    labels.value->convertTo(result.labels, CV_16U);
+    if (auto problem = layout_problem(image, wide ? CV_16UC1 : CV_8UC1)) return std::move(*problem);
+    if (wide) {
+      result.labels = *copy_of(image, CV_16UC1).value;
+    } else {
+      bytes_of(image, CV_8UC1).convertTo(result.labels, CV_16U);
+    }
     return result;
   }
   if (encoding != "rgb8" && encoding != "bgr8") {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "pocd/common/check.hpp"
@@ -13,6 +14,9 @@ namespace {
 constexpr double kMaxCells = 64e6;
 
 constexpr std::uint32_t kNoOwner = 0;
+
+// Blocks per piece of the search for seen ones, about 15 microseconds.
+constexpr std::size_t kNearGrain = 256;
 
 // Points along a ray through the band: at most half a block apart, so that a block that lies
 // between two points is cut at a corner only and neighbouring rays find it.
@@ -58,8 +62,7 @@ void BlockFinder::scan(const TsdfConfig& config, const IntegrationInput& input, 
   block_m_ = config.voxel_size_m * VoxelBlock::kSide;
   place_grid();
   const std::size_t cells = static_cast<std::size_t>(size_x_) * size_y_ * size_z_;
-  if (marks_.size() < cells) marks_ = std::vector<std::atomic<std::uint8_t>>(cells * 3 / 2);
-  for (std::size_t i = 0; i < cells; ++i) marks_[i].store(0, std::memory_order_relaxed);
+  marks_.assign(cells, 0);
 
   // At least three samples across a block at the depth limit. A block that fewer pixels see, at the
   // image border or an outline, may be found only in a later frame.
@@ -128,7 +131,11 @@ void BlockFinder::scan_tile_row(int tile_row) {
       band_cells(row, depth, count, static_cast<float>(columns_[first]),
                  static_cast<float>(step_px_), cells);
       for (int i = 0; i < points * count; ++i) {
-        marks_[cells[i]].store(1, std::memory_order_relaxed);
+        // Most are marked already: a line that is only read stays in every processor's cache.
+        std::uint8_t* const mark = &marks_[cells[i]];
+        if (__atomic_load_n(mark, __ATOMIC_RELAXED) == 0) {
+          __atomic_store_n(mark, std::uint8_t{1}, __ATOMIC_RELAXED);
+        }
       }
     }
   }
@@ -136,13 +143,19 @@ void BlockFinder::scan_tile_row(int tile_row) {
 
 const std::vector<BlockKey>& BlockFinder::band() {
   band_.clear();
-  std::size_t i = 0;
+  if (!marks_.empty()) marks_[0] = 0;  // the invalid samples
+  const std::uint8_t* row = marks_.data();
+  const auto width = static_cast<std::size_t>(size_x_);
   for (int z = 0; z < size_z_; ++z) {
-    for (int y = 0; y < size_y_; ++y) {
-      for (int x = 0; x < size_x_; ++x, ++i) {
-        if (marks_[i].load(std::memory_order_relaxed) && i > 0) {
-          band_.push_back({first_.x + x, first_.y + y, first_.z + z});
-        }
+    for (int y = 0; y < size_y_; ++y, row += width) {
+      const std::uint8_t* at = row;
+      const auto next = [&] {
+        return static_cast<const std::uint8_t*>(
+            std::memchr(at, 1, static_cast<std::size_t>(row + width - at)));
+      };
+      for (const std::uint8_t* found = next(); found != nullptr; found = next()) {
+        band_.push_back({first_.x + static_cast<int>(found - row), first_.y + y, first_.z + z});
+        at = found + 1;
       }
     }
   }
@@ -176,15 +189,13 @@ float BlockFinder::farthest_depth(const Eigen::Vector3d& center_C, double radius
   return far_depth;
 }
 
-void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp,
-                              std::vector<std::uint32_t>& slots) const {
+void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp, ThreadPool& pool,
+                              std::vector<std::uint32_t>& slots) {
   const Pose T_C_W = input_->frame->T_W_C.inverse();
   constexpr int kShift = BlockStore::kRegionShift;
   const double block_radius = 0.5 * std::sqrt(3.0) * block_m_;
   const double region_radius = block_radius * (1 << kShift);
-  // Half the extent of a block along the optical axis.
-  const double half_z = 0.5 * block_m_ * T_C_W.linear().row(2).cwiseAbs().sum();
-  const double truncation = config_.truncation_m();
+  near_.clear();
   for (int z = first_.z >> kShift; z <= (first_.z + size_z_ - 1) >> kShift; ++z) {
     for (int y = first_.y >> kShift; y <= (first_.y + size_y_ - 1) >> kShift; ++y) {
       for (int x = first_.x >> kShift; x <= (first_.x + size_x_ - 1) >> kShift; ++x) {
@@ -193,18 +204,28 @@ void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp,
         const Eigen::Vector3d center_W =
             (Eigen::Vector3d(x, y, z).array() + 0.5) * block_m_ * (1 << kShift);
         if (farthest_depth(T_C_W * center_W, region_radius) == 0.0f) continue;
-        for (const std::uint32_t slot : store.enter(*region)) {
-          const BlockKey& key = store.block(slot).key;
-          const Eigen::Vector3d block_W =
-              (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * block_m_;
-          const Eigen::Vector3d block_C = T_C_W * block_W;
-          const float far = farthest_depth(block_C, block_radius);
-          if (far > 0.0f && block_C.z() - half_z < far + truncation && store.visit(slot, stamp)) {
-            slots.push_back(slot);
-          }
-        }
+        const std::vector<std::uint32_t>& members = store.enter(*region);
+        near_.insert(near_.end(), members.begin(), members.end());
       }
     }
+  }
+  // Half the extent of a block along the optical axis.
+  const double half_z = 0.5 * block_m_ * T_C_W.linear().row(2).cwiseAbs().sum();
+  const double truncation = config_.truncation_m();
+  const BlockStore& blocks = store;
+  near_seen_.resize(near_.size());
+  pool.parallel_for(near_.size(), kNearGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const BlockKey& key = blocks.block(near_[n]).key;
+      const Eigen::Vector3d block_W =
+          (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * block_m_;
+      const Eigen::Vector3d block_C = T_C_W * block_W;
+      const float far = farthest_depth(block_C, block_radius);
+      near_seen_[n] = far > 0.0f && block_C.z() - half_z < far + truncation;
+    }
+  });
+  for (std::size_t n = 0; n < near_.size(); ++n) {
+    if (near_seen_[n] && store.visit(near_[n], stamp)) slots.push_back(near_[n]);
   }
 }
 

@@ -2,7 +2,6 @@
 // front of the surface.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -27,7 +26,8 @@ class BlockFinder {
   /// Allocated blocks not yet visited with `stamp` that reach into the space that the frame saw,
   /// free or within the band (the sampled rays miss blocks of which they would cut only a corner);
   /// visits them.
-  void append_seen(BlockStore& store, std::uint64_t stamp, std::vector<std::uint32_t>& slots) const;
+  void append_seen(BlockStore& store, std::uint64_t stamp, ThreadPool& pool,
+                   std::vector<std::uint32_t>& slots);
 
  private:
   static constexpr int kTile_px = 16;
@@ -44,11 +44,13 @@ class BlockFinder {
   std::vector<std::int32_t> columns_, owner_columns_;  // of the sampled pixels
   BlockKey first_;                                     // key of cell (0, 0, 0)
   int size_x_ = 0, size_y_ = 0, size_z_ = 0;
-  std::vector<std::atomic<std::uint8_t>> marks_;
+  std::vector<std::uint8_t> marks_;  // per cell; written by several threads, always the same value
   int tiles_x_ = 0, tiles_y_ = 0;
   std::vector<float> tile_far_;
   std::vector<std::int32_t> cells_;  // scratch of scan_tile_row, one part per row
   std::vector<BlockKey> band_;
+  std::vector<std::uint32_t> near_;      // blocks of regions in view
+  std::vector<std::uint8_t> near_seen_;  // whether they reach into what was seen
 };
 
 }  // namespace pocd

@@ -199,6 +199,20 @@ void BlockStore::note_owners(std::uint32_t slot) {
   }
 }
 
+bool BlockStore::lacks_owner(std::uint32_t slot, std::uint32_t owner) const {
+  const std::vector<std::uint32_t>& owners = meta(slot).owners;
+  return owner != 0 && std::find(owners.begin(), owners.end(), owner) == owners.end();
+}
+
+bool BlockStore::lacks_owners(std::uint32_t slot) const {
+  std::uint32_t last = 0;
+  for (const std::uint32_t owner : block(slot).owner) {
+    if (owner != last && lacks_owner(slot, owner)) return true;
+    last = owner;
+  }
+  return false;
+}
+
 std::vector<std::uint32_t> BlockStore::take_owner(std::uint32_t owner) {
   // Seen first, so that bringing a part of the owner back does not send another part away.
   if (const auto here = owner_slots_.find(owner); here != owner_slots_.end()) {

@@ -80,6 +80,9 @@ class BlockStore {
   void note_owner(std::uint32_t slot, std::uint32_t owner);
   /// The same for every owner that the voxels of the block have now.
   void note_owners(std::uint32_t slot);
+  /// Whether note_owner(), note_owners() would note anything new.
+  bool lacks_owner(std::uint32_t slot, std::uint32_t owner) const;
+  bool lacks_owners(std::uint32_t slot) const;
   /// Takes the blocks that may hold voxels of the owner, by key, and forgets them for that owner.
   /// Brings those on disk back.
   std::vector<std::uint32_t> take_owner(std::uint32_t owner);
@@ -120,6 +123,9 @@ class BlockStore {
   };
 
   Meta& meta(std::uint32_t slot) { return chunks_[slot >> kChunkShift]->meta[slot & kChunkMask]; }
+  const Meta& meta(std::uint32_t slot) const {
+    return chunks_[slot >> kChunkShift]->meta[slot & kChunkMask];
+  }
   Region& region_of_slot(std::uint32_t slot) { return *chunks_[slot >> kChunkShift]->region; }
 
   Region& find_or_make_region(const BlockKey& region_key);

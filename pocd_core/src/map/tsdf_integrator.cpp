@@ -61,6 +61,7 @@ void TsdfIntegrator::prepare(const TsdfConfig& config, const IntegrationInput& i
 void TsdfIntegrator::integrate(const TsdfConfig& config, const IntegrationInput& input,
                                BlockStore& store, ThreadPool& pool) {
   check_input(input);
+  pool.rouse();
   prepare(config, input);
   finder_.scan(config, input, pool);
 
@@ -71,7 +72,7 @@ void TsdfIntegrator::integrate(const TsdfConfig& config, const IntegrationInput&
     store.visit(slot, stamp_);
     slots_.push_back(slot);
   }
-  finder_.append_seen(store, stamp_, slots_);
+  finder_.append_seen(store, stamp_, pool, slots_);
 
   outcomes_.resize(slots_.size());
   const Pose T_C_W = input.frame->T_W_C.inverse();
@@ -82,7 +83,11 @@ void TsdfIntegrator::integrate(const TsdfConfig& config, const IntegrationInput&
       const Eigen::Vector3d corner_W =
           Eigen::Vector3d(block.key.x, block.key.y, block.key.z) * block_m;
       const Eigen::Vector3f corner_C = (T_C_W * corner_W).cast<float>();
-      outcomes_[n] = integrate_block(kernel_, corner_C.x(), corner_C.y(), corner_C.z(), block);
+      BlockOutcome& outcome = outcomes_[n];
+      outcome = integrate_block(kernel_, corner_C.x(), corner_C.y(), corner_C.z(), block);
+      outcome.notes_owners = outcome.owner_any == outcome.owner_all
+                                 ? store.lacks_owner(slots_[n], outcome.owner_any)
+                                 : outcome.owner_any != 0 && store.lacks_owners(slots_[n]);
     }
   });
   settle(store);
@@ -98,9 +103,10 @@ void TsdfIntegrator::settle(BlockStore& store) {
     }
     if (!outcome.changed) continue;
     store.mark_dirty(slot);
+    if (!outcome.notes_owners) continue;
     if (outcome.owner_any == outcome.owner_all) {
       store.note_owner(slot, outcome.owner_any);
-    } else if (outcome.owner_any != 0) {
+    } else {
       store.note_owners(slot);
     }
   }

@@ -48,6 +48,8 @@ struct BlockOutcome {
   /// Bitwise union and intersection of the owners that are new to a voxel: equal when it is one
   /// only; union 0 when it is none but background.
   std::uint32_t owner_any = 0, owner_all = 0xFFFFFFFFu;
+  /// The store has not noted all of them for the block.
+  bool notes_owners = false;
 };
 
 /// Fuses the frame into one block whose first corner lies at (x, y, z) in the camera frame [m].

@@ -130,12 +130,12 @@ void EventsCsv::add(const ObjectEvent& event, const std::string& class_name) {
 }
 
 TimingCsv::TimingCsv(const std::filesystem::path& file)
-    : file_(file, "frame,stamp_ns,robot,stage,wall_ms") {}
+    : file_(file, "frame,stamp_ns,robot,stage,wall_ms,cpu_ms") {}
 
 void TimingCsv::add(const Frame& frame, const std::vector<StageTiming>& timings) {
   for (const StageTiming& timing : timings) {
     file_.row({std::to_string(frame.sequence), std::to_string(frame.stamp_ns), frame.robot,
-               timing.stage, number(timing.wall_ms)});
+               timing.stage, number(timing.wall_ms), number(timing.cpu_ms)});
   }
 }
 

@@ -32,11 +32,6 @@ T good(Checked<T> checked) {
   return std::move(*checked.value);
 }
 
-ImageView view_of(const RosImage& image) {
-  return {image.width, image.height, image.encoding, image.is_bigendian != 0,
-          image.step,  image.data,   image.size};
-}
-
 StampedTransform transform_of(const RosTransform& transform) {
   return good(checked_transform({transform.header.frame_id, transform.child_frame_id,
                                  transform.header.stamp_ns, transform.T}));

@@ -21,6 +21,11 @@ PoseQuaternion read_pose(CdrReader& in) {
 
 }  // namespace
 
+ImageView view_of(const RosImage& image) {
+  return {image.width, image.height, image.encoding, image.is_bigendian != 0,
+          image.step,  image.data,   image.size};
+}
+
 RosImage decode_image(const std::uint8_t* data, std::size_t size) {
   CdrReader in(data, size);
   RosImage image;

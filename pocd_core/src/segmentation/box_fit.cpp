@@ -1,6 +1,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -25,11 +26,12 @@ OrientedBox box_at_heading(const Points& points_W, double yaw, double trim) {
   Eigen::Vector3d low, high;
   const auto skip = static_cast<std::ptrdiff_t>(trim * static_cast<double>(points_W.size()));
   for (int k = 0; k < 3; ++k) {
+    // A heap of the few outermost: most points are one comparison that goes the usual way.
     auto& v = axis[k];
-    std::nth_element(v.begin(), v.begin() + skip, v.end());
+    std::partial_sort(v.begin(), v.begin() + skip + 1, v.end());
     low[k] = v[skip];
-    std::nth_element(v.begin(), v.end() - 1 - skip, v.end());
-    high[k] = *(v.end() - 1 - skip);
+    std::partial_sort(v.begin(), v.begin() + skip + 1, v.end(), std::greater<>());
+    high[k] = v[skip];
   }
   const Eigen::Vector3d mid = 0.5 * (low + high);
   OrientedBox box;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "pocd/common/cell_index.hpp"
 #include "pocd/common/kernel.hpp"
@@ -19,14 +21,22 @@ struct Memory {
     float sigma = 0.0f;
     int count = 0;
   };
+  struct Component {
+    std::int32_t first = 0, pixels = 0;
+    double area_m2 = 0.0;
+    std::int32_t kept = -1;  ///< number of its cluster
+  };
   // Per grid pixel.
   std::vector<std::uint32_t> key;   // class and instance
   std::vector<float> limit2;        // squared reach to neighbours; negative: no object pixel
   std::vector<std::int32_t> links;  // bits: which neighbours belong to the same thing
   std::vector<std::int32_t> run_of;
   // Per run.
-  std::vector<std::int32_t> parent;  // union-find
+  std::vector<std::int32_t> first_of, end_of;  // its pixels
+  std::vector<std::int32_t> parent;            // union-find
   std::vector<std::int32_t> component;
+  std::vector<Component> components;
+  std::vector<std::uint32_t> column_steps;  // per column: bit n where n divides it
   CellIndex cells;
   std::vector<CellSum> sums;
   std::vector<std::vector<std::int32_t>> members;  // spare lists
@@ -118,21 +128,34 @@ void join(std::vector<std::int32_t>& parent, std::int32_t a, std::int32_t b) {
 void join_runs(const OrganizedCloud& cloud, Memory& memory) {
   const std::int32_t width = cloud.width;
   const auto size = static_cast<std::int32_t>(cloud.size());
+  const float* const limit2 = memory.limit2.data();
+  const std::int32_t* const links = memory.links.data();
   memory.run_of.resize(cloud.size());
-  memory.parent.clear();
+  memory.first_of.clear();
+  memory.end_of.clear();
   for (std::int32_t i = 0; i < size; ++i) {
-    if (memory.limit2[i] < 0.0f) continue;
-    const bool goes_on = i % width > 0 && (memory.links[i - 1] & kRight);
-    if (!goes_on) memory.parent.push_back(static_cast<std::int32_t>(memory.parent.size()));
-    memory.run_of[i] = static_cast<std::int32_t>(memory.parent.size()) - 1;
+    if (limit2[i] < 0.0f) continue;
+    const auto run = static_cast<std::int32_t>(memory.first_of.size());
+    memory.first_of.push_back(i);
+    memory.run_of[i] = run;
+    while (links[i] & kRight) memory.run_of[++i] = run;  // no link leaves its row
+    memory.end_of.push_back(i + 1);
   }
-  for (std::int32_t i = 0; i < size; ++i) {
-    const std::int32_t links = memory.links[i];
-    if ((links & (kRight2 | kDown | kDown2)) == 0) continue;
-    const std::int32_t run = memory.run_of[i];
-    if (links & kRight2) join(memory.parent, run, memory.run_of[i + 2]);
-    if (links & kDown) join(memory.parent, run, memory.run_of[i + width]);
-    if (links & kDown2) join(memory.parent, run, memory.run_of[i + 2 * width]);
+  memory.parent.resize(memory.first_of.size());
+  std::iota(memory.parent.begin(), memory.parent.end(), 0);
+  for (std::size_t r = 0; r < memory.parent.size(); ++r) {
+    const auto run = static_cast<std::int32_t>(r);
+    // Neighbouring pixels mostly lead to the same run again.
+    std::int32_t last = run;
+    const auto join_with = [&](std::int32_t other) {
+      if (other != last) join(memory.parent, run, other);
+      last = other;
+    };
+    for (std::int32_t i = memory.first_of[r]; i < memory.end_of[r]; ++i) {
+      if (links[i] & kRight2) join_with(memory.run_of[i + 2]);
+      if (links[i] & kDown) join_with(memory.run_of[i + width]);
+      if (links[i] & kDown2) join_with(memory.run_of[i + 2 * width]);
+    }
   }
 }
 
@@ -143,46 +166,55 @@ std::vector<Cluster> find_clusters(const OrganizedCloud& cloud, const Segmentati
   join_runs(cloud, memory);
 
   // First only counted: most components are specks that are dropped.
+  const std::size_t runs = memory.parent.size();
   std::size_t components = 0;
-  memory.component.resize(memory.parent.size());
-  for (std::size_t run = 0; run < memory.parent.size(); ++run) {
+  memory.component.resize(runs);
+  for (std::size_t run = 0; run < runs; ++run) {
     const std::int32_t root = find_root(memory.parent, static_cast<std::int32_t>(run));
     memory.component[run] = static_cast<std::size_t>(root) == run
                                 ? static_cast<std::int32_t>(components++)
                                 : memory.component[root];
   }
-  std::vector<Cluster> all(components);
+  std::vector<Memory::Component>& all = memory.components;
+  all.assign(components, {});
   const double pixel_area = 1.0 / (cloud.camera.fx * cloud.camera.fy);
-  const auto size = static_cast<std::int32_t>(cloud.size());
-  for (std::int32_t i = 0; i < size; ++i) {
-    if (memory.limit2[i] < 0.0f) continue;
-    Cluster& cluster = all[memory.component[memory.run_of[i]]];
-    if (cluster.pixels++ == 0) {
-      cluster.class_id = cloud.label[i];
-      cluster.instance = cloud.instance[i];
+  for (std::size_t run = 0; run < runs; ++run) {
+    Memory::Component& component = all[memory.component[run]];
+    const std::int32_t first = memory.first_of[run], end = memory.end_of[run];
+    if (component.pixels == 0) component.first = first;
+    component.pixels += end - first;
+    double area_m2 = component.area_m2;
+    for (std::int32_t i = first; i < end; ++i) {
+      const double z = cloud.depth_m[i];
+      area_m2 += z * z * pixel_area;
     }
-    const double z = cloud.depth_m[i];
-    cluster.area_m2 += z * z * pixel_area;
+    component.area_m2 = area_m2;
   }
   // Those that stay get new numbers; the others none.
-  std::vector<std::int32_t> kept(components, -1);
   std::vector<Cluster> clusters;
-  clusters.reserve(static_cast<std::size_t>(size) / config.min_cluster_pixels + 1);
-  for (std::size_t c = 0; c < components; ++c) {
-    if (all[c].pixels < config.min_cluster_pixels || all[c].area_m2 < config.min_cluster_area_m2)
+  clusters.reserve(cloud.size() / static_cast<std::size_t>(config.min_cluster_pixels) + 1);
+  for (Memory::Component& component : all) {
+    if (component.pixels < config.min_cluster_pixels ||
+        component.area_m2 < config.min_cluster_area_m2) {
       continue;
-    kept[c] = static_cast<std::int32_t>(clusters.size());
-    clusters.push_back(std::move(all[c]));
+    }
+    component.kept = static_cast<std::int32_t>(clusters.size());
+    Cluster& cluster = clusters.emplace_back();
+    cluster.class_id = cloud.label[component.first];
+    cluster.instance = cloud.instance[component.first];
+    cluster.pixels = component.pixels;
+    cluster.area_m2 = component.area_m2;
     if (memory.members.empty()) memory.members.emplace_back();
-    clusters.back().members = std::move(memory.members.back());
+    cluster.members = std::move(memory.members.back());
     memory.members.pop_back();
-    clusters.back().members.clear();
-    clusters.back().members.reserve(static_cast<std::size_t>(clusters.back().pixels));
+    cluster.members.clear();
+    cluster.members.reserve(static_cast<std::size_t>(cluster.pixels));
   }
-  for (std::int32_t i = 0; i < size; ++i) {
-    if (memory.limit2[i] < 0.0f) continue;
-    const std::int32_t c = kept[memory.component[memory.run_of[i]]];
-    if (c >= 0) clusters[c].members.push_back(i);
+  for (std::size_t run = 0; run < runs; ++run) {
+    const std::int32_t kept = all[memory.component[run]].kept;
+    if (kept < 0) continue;
+    std::vector<std::int32_t>& members = clusters[kept].members;
+    for (std::int32_t i = memory.first_of[run]; i < memory.end_of[run]; ++i) members.push_back(i);
   }
   return clusters;
 }
@@ -234,6 +266,41 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
   }
 }
 
+/// Bit n (up to 31) where n divides `number`.
+std::uint32_t divisors(std::int32_t number) {
+  std::uint32_t bits = 0;
+  for (std::int32_t n = 1; n < 32; ++n) bits |= number % n == 0 ? 1u << n : 0u;
+  return bits;
+}
+
+/// Whether a pixel is on the grid of every step-th row and column, without a division per pixel
+/// when they come row by row.
+class PixelGrid {
+ public:
+  PixelGrid(int width, std::vector<std::uint32_t>& column_steps)
+      : width_(width), column_steps_(column_steps) {
+    if (column_steps_.size() == static_cast<std::size_t>(width)) return;
+    column_steps_.clear();
+    for (int col = 0; col < width; ++col) column_steps_.push_back(divisors(col));
+  }
+  bool has(std::int32_t i, int step) {
+    if (i < row_begin_ || i >= row_begin_ + width_) {
+      row_ = i / width_;
+      row_begin_ = row_ * width_;
+      row_steps_ = divisors(row_);
+    }
+    const std::int32_t col = i - row_begin_;
+    if (step < 32) return (row_steps_ & column_steps_[col]) >> step & 1u;
+    return col % step == 0 && row_ % step == 0;
+  }
+
+ private:
+  const std::int32_t width_;
+  std::vector<std::uint32_t>& column_steps_;
+  std::int32_t row_ = -1, row_begin_ = std::numeric_limits<std::int32_t>::max();
+  std::uint32_t row_steps_ = 0;
+};
+
 /// Thins a cluster: averages the points of each cell of a grid. Only about four pixels per cell and
 /// axis are looked at, however near the surface is.
 void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const DepthNoise& noise,
@@ -248,10 +315,11 @@ void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const De
   // Neighbours mostly fall into one cell.
   std::uint64_t last_key = 0;
   std::int32_t last = CellIndex::kNone;
+  PixelGrid grid(cloud.width, memory.column_steps);
   for (const std::int32_t i : cluster.members) {
     const float z = cloud.depth_m[i];
     const int step = std::max(1, static_cast<int>(pixels_per_spacing / z / 4.0));
-    if (step > 1 && ((i % cloud.width) % step != 0 || (i / cloud.width) % step != 0)) continue;
+    if (!grid.has(i, step)) continue;
     const Eigen::Vector3f p = cloud.point_W(i);
     const std::uint64_t key = cell_key(p, inverse);
     if (last == CellIndex::kNone || key != last_key) {

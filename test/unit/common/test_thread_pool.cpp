@@ -22,6 +22,33 @@ TEST(ThreadPool, EveryIndexIsDoneOnceForAnyThreadCount) {
   }
 }
 
+// More threads than pieces, and than processors: some wake up when the job is long over.
+TEST(ThreadPool, ManyShortJobsLoseAndRepeatNothing) {
+  ThreadPool pool(8);
+  for (int job = 0; job < 5000; ++job) {
+    std::vector<int> done(3, 0);  // of this job only: a late thread would write to freed memory
+    pool.parallel_for(done.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) done[i] += job;
+    });
+    for (const int value : done) ASSERT_EQ(value, job);
+  }
+}
+
+TEST(ThreadPool, CountsTheTimeOfItsOwnThreads) {
+  ThreadPool alone(1), two(2);
+  const auto spin = [](std::size_t, std::size_t) {
+    volatile double x = 1.0;
+    for (int i = 0; i < 10000; ++i) x = x * 1.0000001;
+  };
+  alone.parallel_for(100, 1, spin);
+  EXPECT_EQ(alone.worker_cpu_ms(), 0.0);
+  // Until the other thread has got a piece, however busy the machine is.
+  while (two.worker_cpu_ms() == 0.0) two.parallel_for(100, 1, spin);
+  const double before_ms = two.worker_cpu_ms();
+  two.parallel_for(100, 1, spin);
+  EXPECT_GE(two.worker_cpu_ms(), before_ms);
+}
+
 TEST(ThreadPool, ExceptionOfAPieceReachesTheCallerAndThePoolGoesOn) {
   ThreadPool pool(3);
   const auto broken = [&] {

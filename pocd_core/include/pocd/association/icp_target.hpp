@@ -34,6 +34,8 @@ class IcpTarget {
   /// Nearest point within max_correspondence_m() of `query`, given relative to origin_W().
   /// Of equally near points always the same one.
   std::optional<Neighbour> nearest(const Eigen::Vector3f& query) const;
+  /// The same within inlier_distance_m(), and faster.
+  std::optional<Neighbour> nearest_inlier(const Eigen::Vector3f& query) const;
 
   /// Corner of the points' bounding box. Coordinates relative to it keep float precision in a large
   /// map.
@@ -48,6 +50,8 @@ class IcpTarget {
     Eigen::Array3i cells;  ///< including a border of two empty cells on every side
     std::vector<std::uint32_t>
         begin;  ///< per cell, x fastest: its first point; one more at the end
+    /// Per cell: which of the nine rows of three cells around it have points.
+    std::vector<std::uint16_t> rows;
     std::vector<Eigen::Vector3f> points;
     std::vector<Eigen::Vector3f> normals;
 
@@ -55,6 +59,7 @@ class IcpTarget {
       return (cell.z() * cells.y() + cell.y()) * cells.x() + cell.x();
     }
     Eigen::Array3i cell_of(const Eigen::Vector3f& point) const;
+    void note_rows();
   };
 
   static Level make_level(const std::vector<Eigen::Vector3f>& points,

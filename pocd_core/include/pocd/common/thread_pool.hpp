@@ -17,6 +17,11 @@ class ThreadPool {
   ThreadPool& operator=(const ThreadPool&) = delete;
 
   int threads() const;
+  /// CPU time that the threads other than the caller's have spent on pieces so far [ms].
+  double worker_cpu_ms() const;
+
+  /// Work follows at once: who sleeps may wake up meanwhile.
+  void rouse();
 
   /// Calls piece(begin, end) over [0, count) cut in chunks of `grain`, in any order and on any
   /// thread; returns when all are done. A piece must write only what its own indices own, so that

@@ -62,10 +62,12 @@ struct ObjectEvent {
   Evidence evidence;
 };
 
-/// A stage and the time it took. Wall clock; never used in a decision.
+/// A stage and the time it took, by the clock and of all its threads' processors; never used in a
+/// decision.
 struct StageTiming {
   const char* stage = "";
   double wall_ms = 0.0;
+  double cpu_ms = 0.0;
 };
 
 struct FrameResult {

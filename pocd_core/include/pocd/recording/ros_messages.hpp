@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pocd/common/types.hpp"
+#include "pocd/input/message_checks.hpp"
 #include "pocd/input/pose_quaternion.hpp"
 #include "pocd/recording/cdr.hpp"
 
@@ -43,6 +44,9 @@ struct RosTransform {
 };
 
 /// All throw DamagedData when the payload does not fit the type.
+/// For the checks; valid as long as `image` and its payload.
+ImageView view_of(const RosImage& image);
+
 RosImage decode_image(const std::uint8_t* data, std::size_t size);
 RosCameraInfo decode_camera_info(const std::uint8_t* data, std::size_t size);
 RosTransform decode_odometry(const std::uint8_t* data, std::size_t size);

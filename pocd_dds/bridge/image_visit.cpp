@@ -1,0 +1,33 @@
+#include "pocd_dds/bridge/image_visit.hpp"
+
+#include "pocd/recording/bytes.hpp"
+#include "sensor_msgsPubSubTypes.h"
+
+namespace pocd::dds {
+
+using eprosima::fastrtps::rtps::SerializedPayload_t;
+
+ImageVisitType::ImageVisitType() {
+  const sensor_msgs::msg::ImagePubSubType generated;
+  setName(generated.getName());
+  m_typeSize = generated.m_typeSize;
+  m_isGetKeyDefined = false;
+}
+
+bool ImageVisitType::deserialize(SerializedPayload_t* payload, void* data) {
+  recording::RosImage image;
+  try {
+    image = recording::decode_image(payload->data, payload->length);
+  } catch (const recording::DamagedData&) {
+    return false;
+  }
+  const auto& visit = *static_cast<const ImageVisit*>(data);
+  if (visit.use) visit.use(image);
+  return true;
+}
+
+std::function<std::uint32_t()> ImageVisitType::getSerializedSizeProvider(void*) {
+  return [] { return 0u; };
+}
+
+}  // namespace pocd::dds

@@ -1,0 +1,32 @@
+// sensor_msgs/Image for a subscriber that converts it where it lies, in the middleware's memory.
+#pragma once
+
+#include <fastdds/dds/topic/TopicDataType.hpp>
+#include <functional>
+
+#include "pocd/recording/ros_messages.hpp"
+
+namespace pocd::dds {
+
+/// The "sample" of such a reader: take() calls `use` with views that end with the call.
+struct ImageVisit {
+  std::function<void(const recording::RosImage&)> use;
+};
+
+/// Has the name of the generated type and reads the same payloads; cannot write any.
+class ImageVisitType : public eprosima::fastdds::dds::TopicDataType {
+ public:
+  using type = ImageVisit;
+
+  ImageVisitType();
+  /// False, without a call of `use`, for a payload that is no image.
+  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override;
+
+  bool serialize(void*, eprosima::fastrtps::rtps::SerializedPayload_t*) override { return false; }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void*) override;
+  void* createData() override { return new ImageVisit; }
+  void deleteData(void* data) override { delete static_cast<ImageVisit*>(data); }
+  bool getKey(void*, eprosima::fastrtps::rtps::InstanceHandle_t*, bool) override { return false; }
+};
+
+}  // namespace pocd::dds
