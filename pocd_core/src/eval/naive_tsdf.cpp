@@ -87,11 +87,14 @@ void NaiveTsdf::integrate(const Frame& frame, const cv::Mat& mask) {
           }
           const int col = static_cast<int>(u), row = static_cast<int>(v);
           const float depth = frame.depth_m.at<float>(row, col);
-          if (!(depth > 0.0f) || depth > max_depth_m) continue;
+          if (!(depth > 0.0f)) continue;
           if (!mask.empty() && mask.at<std::uint8_t>(row, col) == 0) continue;
           const float s = depth - p.z();
           if (s < -truncation_m) continue;
-          float weight = 1.0f / (depth * depth);
+          // Voxblox too clears with rays that end beyond the limit.
+          if (depth > max_depth_m && (s < truncation_m || p.z() > max_depth_m)) continue;
+          const float range_m = std::min(depth, max_depth_m);
+          float weight = 1.0f / (range_m * range_m);
           if (s < -voxel_m) weight *= (truncation_m + s) / (truncation_m - voxel_m);
           if (weight <= 0.0f) continue;
           const auto n = static_cast<std::size_t>(i);

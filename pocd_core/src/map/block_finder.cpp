@@ -127,6 +127,10 @@ void BlockFinder::scan_tile_row(int tile_row) {
       for (int i = 0; i < count; ++i) {
         float& tile = far[static_cast<unsigned>(first + i) / per_tile];
         tile = depth[i] > tile ? depth[i] : tile;
+        if (config_.clear_beyond_limit && image_row[columns_[first + i]] > max_depth &&
+            owner_row[owner_columns_[first + i]] != IntegrationInput::kSkip) {
+          tile = max_depth;
+        }
       }
       band_cells(row, depth, count, static_cast<float>(columns_[first]),
                  static_cast<float>(step_px_), cells);

@@ -40,6 +40,7 @@ void TsdfIntegrator::prepare(const TsdfConfig& config, const IntegrationInput& i
   k.owner_max_v = input.owners ? static_cast<float>(input.owner_height - 1) : 0.0f;
   k.owner_scale = input.owners ? 1.0f / static_cast<float>(input.owner_stride) : 0.0f;
   k.max_depth = static_cast<float>(config.max_depth_m);
+  k.clear_depth = config.clear_beyond_limit ? k.max_depth : 0.0f;
   k.truncation = static_cast<float>(config.truncation_m());
   k.owner_band = kOwnerBandVoxels * static_cast<float>(config.voxel_size_m);
   k.max_weight = static_cast<float>(config.max_weight);

@@ -46,9 +46,10 @@ POCD_KERNEL void find_pixels(const KernelFrame& f, float bx, float by, float bz,
   }
 }
 
-// Projective signed distance of each voxel, kBehind where no usable pixel sees it.
-POCD_KERNEL void look_up(float max_depth, const float* __restrict depth,
-                         const std::uint32_t* __restrict owners,
+// Projective signed distance of each voxel, kBehind where no usable pixel sees it. A pixel beyond
+// max_depth is usable for free space up to clear_depth.
+POCD_KERNEL void look_up(float max_depth, float clear_depth, float truncation,
+                         const float* __restrict depth, const std::uint32_t* __restrict owners,
                          const std::int32_t* __restrict pixel,
                          const std::int32_t* __restrict owner_pixel,
                          const float* __restrict minus_z, float* __restrict distance,
@@ -57,7 +58,9 @@ POCD_KERNEL void look_up(float max_depth, const float* __restrict depth,
     const float d = depth[pixel[i]];
     const std::uint32_t o = owners[owner_pixel[i]];
     const float s = d + minus_z[i];
-    const float in_range = d <= max_depth ? s : kBehind;
+    const float near = minus_z[i] >= -clear_depth ? s : kBehind;
+    const float clear = s >= truncation ? near : kBehind;
+    const float in_range = d <= max_depth ? s : clear;
     const float seen = d > 0.0f ? in_range : kBehind;
     distance[i] = o != IntegrationInput::kSkip ? seen : kBehind;
     owner[i] = o;
@@ -184,7 +187,8 @@ BlockOutcome integrate_block(const KernelFrame& frame, float x, float y, float z
   alignas(64) std::uint32_t owner[kVoxels];
   BlockOutcome outcome;
   find_pixels(frame, x, y, z, pixel, owner_pixel, minus_z);
-  look_up(frame.max_depth, frame.depth, frame.owners, pixel, owner_pixel, minus_z, distance, owner);
+  look_up(frame.max_depth, frame.clear_depth, frame.truncation, frame.depth, frame.owners, pixel,
+          owner_pixel, minus_z, distance, owner);
   const float free_weight = std::min(frame.max_weight, static_cast<float>(kFreeWeight));
   const bool contradicted = average(frame.truncation, frame.max_weight, free_weight, distance,
                                     block.tsdf.data(), block.weight.data(), state);

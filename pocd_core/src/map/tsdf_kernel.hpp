@@ -33,7 +33,7 @@ struct KernelFrame {
   int owner_stride = 0;  // elements per row; 0 with a single entry for "no owners given"
   float owner_max_u = 0, owner_max_v = 0;
   float owner_scale = 0;  // 1 / pixels per owner entry
-  float max_depth = 0, truncation = 0, owner_band = 0;
+  float max_depth = 0, clear_depth = 0, truncation = 0, owner_band = 0;
   float max_weight = 0;
   // Voxel centres of a block relative to its first corner, in the camera frame [m].
   alignas(64) float offset_x[VoxelBlock::kVoxels];

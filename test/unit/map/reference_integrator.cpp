@@ -22,7 +22,8 @@ struct Seen {
   std::uint32_t owner = 0;
 };
 
-Seen look_up(const IntegrationInput& input, float max_depth, float x, float y, float z) {
+Seen look_up(const IntegrationInput& input, const TsdfConfig& config, float x, float y, float z) {
+  const float max_depth = static_cast<float>(config.max_depth_m);
   const CameraModel& camera = input.frame->camera;
   Seen seen;
   seen.z = z;
@@ -42,8 +43,11 @@ Seen look_up(const IntegrationInput& input, float max_depth, float x, float y, f
   seen.owner = input.owners ? input.owners[(seen.v / input.owner_stride) * input.owner_width +
                                            seen.u / input.owner_stride]
                             : 0;
-  seen.valid = depth > 0.0f && depth <= max_depth && seen.owner != IntegrationInput::kSkip;
   seen.distance = depth - z;
+  const bool clear = config.clear_beyond_limit && z <= max_depth &&
+                     seen.distance >= static_cast<float>(config.truncation_m());
+  seen.valid =
+      depth > 0.0f && (depth <= max_depth || clear) && seen.owner != IntegrationInput::kSkip;
   return seen;
 }
 
@@ -76,9 +80,8 @@ void ReferenceIntegrator::fuse(const IntegrationInput& input, VoxelBlock& block)
         (T_C_W.linear() * (Eigen::Vector3d((i & 7) + 0.5, (i >> 3 & 7) + 0.5, (i >> 6) + 0.5) *
                            config_.voxel_size_m))
             .cast<float>();
-    const Seen seen =
-        look_up(input, static_cast<float>(config_.max_depth_m), corner.x() + offset.x(),
-                corner.y() + offset.y(), corner.z() + offset.z());
+    const Seen seen = look_up(input, config_, corner.x() + offset.x(), corner.y() + offset.y(),
+                              corner.z() + offset.z());
     if (!seen.valid || seen.distance < -truncation) continue;
     std::int16_t& tsdf = block.tsdf[i];
     std::uint16_t& weight = block.weight[i];
@@ -148,8 +151,7 @@ std::vector<BlockKey> blocks_near_surface(const TsdfConfig& config, const Integr
         if (near.count(key)) continue;
         const Eigen::Vector3f c =
             (T_C_W * ((voxel.cast<double>().array() + 0.5) * voxel_m).matrix()).cast<float>();
-        const Seen seen =
-            look_up(input, static_cast<float>(config.max_depth_m), c.x(), c.y(), c.z());
+        const Seen seen = look_up(input, config, c.x(), c.y(), c.z());
         if (seen.valid && std::abs(seen.distance) <= band_voxels * voxel_m) near.insert(key);
       }
     }

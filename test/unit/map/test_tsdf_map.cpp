@@ -102,6 +102,21 @@ TEST(TsdfMap, DepthBeyondTheLimitIsNotUsed) {
   EXPECT_EQ(map.block_count(), 0u);
 }
 
+TEST(TsdfMap, DepthBeyondTheLimitClearsWhatIsBeforeIt) {
+  ThreadPool pool(1);
+  const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+  for (const bool clear : {false, true}) {
+    TsdfConfig config = coarse_config();
+    config.max_depth_m = 2.0;
+    config.clear_beyond_limit = clear;
+    TsdfMap map(config);
+    for (int i = 0; i < 10; ++i) map.integrate(look({1.5, {}}, pose).input(), pool);
+    ASSERT_FALSE(extract_mesh(map, 2, pool).triangles.empty());
+    for (int i = 0; i < 100; ++i) map.integrate(look({2.5, {}}, pose).input(), pool);
+    EXPECT_EQ(extract_mesh(map, 2, pool).triangles.empty(), clear);
+  }
+}
+
 TEST(TsdfMap, ImagesWithGapsBetweenRowsAndWithoutOwnersAreRead) {
   ThreadPool pool(1);
   const View view = look({2.5, {}}, camera_pose({0, 0, 1}, 0.1, 0.1));

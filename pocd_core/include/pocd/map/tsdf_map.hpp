@@ -23,6 +23,7 @@ struct TsdfConfig {
   double voxel_size_m = 0.05;
   double truncation_voxels = 4.0;
   double max_depth_m = 3.0;
+  bool clear_beyond_limit = false;
   int max_weight = 100;
   int min_publish_weight = 2;
   MapMemoryConfig memory;
@@ -36,6 +37,8 @@ struct TsdfConfig {
           "Truncation distance of the signed distance [voxels].");
     visit("max_depth_m", max_depth_m, Range{0.1, 100.0},
           "Depth beyond which a pixel is not used, theta_depth [m].");
+    visit("clear_beyond_limit", clear_beyond_limit,
+          "A pixel beyond max_depth_m still shows that all before that depth is free.");
     visit("max_weight", max_weight, Range{1, 1000},
           "Cap of a voxel's weight [observations]: smaller reacts faster, larger averages longer.");
     visit("min_publish_weight", min_publish_weight, Range{1, 1000},
