@@ -116,7 +116,6 @@ void Node::Impl::work() {
 
 void Node::Impl::process(const Frame& frame) {
   const auto start = Clock::now();
-  const double cpu_ms = thread_cpu_ms();
   latency.started(frame.robot, frame.stamp_ns);
   FrameResult result;
   try {
@@ -127,7 +126,7 @@ void Node::Impl::process(const Frame& frame) {
   }
   latency.processed(frame.robot, frame.stamp_ns);
   const std::lock_guard<std::mutex> lock(mutex);
-  counts.pipeline_cpu_ms += thread_cpu_ms() - cpu_ms;
+  for (const StageTiming& stage : result.timings) counts.pipeline_cpu_ms += stage.cpu_ms;
   busy_ms += 1e3 * seconds(Clock::now() - start);
   ++busy_frames;
   ++counts.processed;

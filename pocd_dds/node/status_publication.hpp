@@ -36,9 +36,9 @@ struct WorkStatus {
   StampNs stamp_ns = 0;  ///< of the last frame
   /// Longest time of the last second from the last image of a frame to its map delta [ms].
   double latency_ms = 0.0;
-  /// CPU time so far [ms]: the pipeline's thread in the pipeline and publishing; the thread that
-  /// takes from the bus, and of that taking images (deserialising); the whole process. What is
-  /// left is the middleware's own threads.
+  /// CPU time so far [ms]: all threads of the pipeline; publishing; the thread that takes from the
+  /// bus, and of that taking and converting images; the whole process. What is left is the
+  /// middleware's own threads and run()'s.
   double pipeline_cpu_ms = 0.0, publishing_cpu_ms = 0.0, intake_cpu_ms = 0.0, take_cpu_ms = 0.0,
          process_cpu_ms = 0.0;
 };

@@ -208,7 +208,7 @@ int main(int argc, char** argv) {
       "Maps sites of different sizes, drives through the same hall of each in turns, and prints "
       "what a frame and a square metre cost.\n"
       "Example: pocd_scale --areas 100,1000,10000\n"
-      "The default needs about 16 GB of memory.\nExit code: 0 done, 1 failed, 2 usage.",
+      "The default needs about 11 GB of memory.\nExit code: 0 done, 1 failed, 2 usage.",
       "pocd_scale");
   std::vector<double> areas{100, 1000, 10000, 100000};
   int budget_mb = 256, rounds = 5;

@@ -111,7 +111,7 @@ IcpTarget::IcpTarget(const Points& points_W, const Points& normals_W, double inl
   }
 }
 
-void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbour& best) {
+std::uint32_t IcpTarget::search(const Level& level, const Eigen::Vector3f& query, float& nearest2) {
   // What cell_of() does, four at a time, for the sake of vector instructions.
   const Eigen::Array4f point(query.x(), query.y(), query.z(), 0.0f);
   const Eigen::Array4f floor = (point / level.cell_m).floor().max(-1e6f).min(1e6f);
@@ -119,9 +119,9 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
   const bool inside = cell.x() >= 1 && cell.y() >= 1 && cell.z() >= 1 &&
                       cell.x() <= level.cells.x() - 2 && cell.y() <= level.cells.y() - 2 &&
                       cell.z() <= level.cells.z() - 2;
-  if (!inside) return;
+  if (!inside) return kNone;
   const int center = level.flat_index(cell.head<3>());
-  if (level.rows[static_cast<std::size_t>(center)] == 0) return;
+  if (level.rows[static_cast<std::size_t>(center)] == 0) return kNone;
   const Eigen::Array4f below = point - floor * level.cell_m;
   const Eigen::Array4f above = level.cell_m - below;
   const float y0 = square(below.y()), y2 = square(above.y());
@@ -132,9 +132,8 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
   const int step[] = {0, -y, y, -z, z, -y - z, y - z, z - y, y + z};
   const std::uint32_t* const begin = level.begin.data() + center;
   const Eigen::Vector3f* const points = level.points.data();
-  const auto none = static_cast<std::uint32_t>(level.points.size());
-  std::uint32_t found = none;
-  float nearest = best.squared_distance_m2;
+  std::uint32_t found = kNone;
+  float nearest = nearest2;
   for (unsigned rows = level.rows[static_cast<std::size_t>(center)]; rows != 0; rows &= rows - 1) {
     const int n = __builtin_ctz(rows);
     if (gap[n] >= nearest) continue;
@@ -147,35 +146,33 @@ void IcpTarget::search(const Level& level, const Eigen::Vector3f& query, Neighbo
       found = closer ? i : found;
     }
   }
-  if (found == none) return;
-  best.squared_distance_m2 = nearest;
-  best.point = level.points[found];
-  best.normal = level.normals[found];
+  nearest2 = nearest;
+  return found;
 }
 
 std::optional<IcpTarget::Neighbour> IcpTarget::nearest_inlier(const Eigen::Vector3f& query) const {
-  Neighbour best;
   const double limit2 = inlier_distance_m_ * inlier_distance_m_;
   // A little more, so that no rounding leaves one out.
-  const float beyond = static_cast<float>(1.001 * limit2);
-  best.squared_distance_m2 = beyond;
-  search(levels_.front(), query, best);  // has all points, in cells that are not smaller
-  if (best.squared_distance_m2 == beyond || best.squared_distance_m2 > limit2) return std::nullopt;
-  return best;
+  float nearest2 = static_cast<float>(1.001 * limit2);
+  const Level& level = levels_.front();  // has all points, in cells that are not smaller
+  const std::uint32_t found = search(level, query, nearest2);
+  if (found == kNone || nearest2 > limit2) return std::nullopt;
+  return Neighbour{level.points[found], level.normals[found], nearest2};
 }
 
 std::optional<IcpTarget::Neighbour> IcpTarget::nearest(const Eigen::Vector3f& query) const {
-  Neighbour best;
   // Points on the limit itself belong to it.
-  best.squared_distance_m2 = just_beyond(square(static_cast<float>(max_correspondence_m_)));
-  const float none = best.squared_distance_m2;
+  float nearest2 = just_beyond(square(static_cast<float>(max_correspondence_m_)));
+  const Level* level_of = nullptr;
+  std::uint32_t found = kNone;
   for (const Level& level : levels_) {
-    search(level, query, best);
+    const std::uint32_t here = search(level, query, nearest2);
+    if (here != kNone) found = here, level_of = &level;
     // Whatever is within one cell has been seen by the search of the 3 x 3 x 3 neighbourhood.
-    if (best.squared_distance_m2 <= square(level.cell_m)) return best;
+    if (nearest2 <= square(level.cell_m)) break;
   }
-  if (best.squared_distance_m2 == none) return std::nullopt;
-  return best;
+  if (level_of == nullptr) return std::nullopt;
+  return Neighbour{level_of->points[found], level_of->normals[found], nearest2};
 }
 
 }  // namespace pocd

@@ -64,7 +64,10 @@ class IcpTarget {
 
   static Level make_level(const std::vector<Eigen::Vector3f>& points,
                           const std::vector<Eigen::Vector3f>& normals, float cell_m);
-  static void search(const Level& level, const Eigen::Vector3f& query, Neighbour& best);
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  /// The nearest point of the level among the cells around the query, if it is nearer than
+  /// `nearest2`, which it lowers; else kNone.
+  static std::uint32_t search(const Level& level, const Eigen::Vector3f& query, float& nearest2);
 
   Eigen::Vector3d origin_W_;
   double inlier_distance_m_;
