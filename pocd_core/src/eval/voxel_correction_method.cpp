@@ -26,6 +26,7 @@ class VoxelCorrectionMethod final : public MappingMethod {
   static TsdfConfig with(TsdfConfig config, const VoxelCorrectionConfig& own) {
     config.max_weight = own.max_weight;
     config.min_publish_weight = own.min_weight;
+    config.clear_beyond_limit = own.clear_beyond_limit;
     return config;
   }
 

@@ -1,6 +1,5 @@
-// Thresholds of the methods that the pipeline is compared with, chosen by reasoning. `pocd_tune`
-// searches better ones on scenes and seeds other than those that are reported; docs/evaluation.md
-// has the command.
+// Thresholds of the methods that the pipeline is compared with, as found by `pocd_tune` on
+// scenes and seeds other than those that are reported; docs/evaluation.md has the command.
 #pragma once
 
 #include "pocd/config/describe.hpp"
@@ -8,7 +7,7 @@
 namespace pocd {
 
 struct StaticTsdfConfig {
-  double max_weight = 10000.0;
+  double max_weight = 5.0;
   double min_weight = 0.5;
 
   template <class Visitor>
@@ -21,24 +20,27 @@ struct StaticTsdfConfig {
 };
 
 struct VoxelCorrectionConfig {
-  int max_weight = 100;
+  int max_weight = 10;
   int min_weight = 2;
+  bool clear_beyond_limit = true;
 
   template <class Visitor>
   void describe(Visitor& visit) {
     visit("max_weight", max_weight, Range{1, 1000}, "Cap of a voxel's weight [observations].");
     visit("min_weight", min_weight, Range{1, 1000},
           "Weight at which a voxel counts as observed [observations].");
+    visit("clear_beyond_limit", clear_beyond_limit,
+          "Pixels beyond the depth limit show free space before it, as those of Voxblox do.");
   }
 };
 
 struct TrackedObjectsConfig {
-  double max_weight = 10000.0;
-  double min_weight = 0.5;
-  int lost_after_frames = 10;
+  double max_weight = 200.0;
+  double min_weight = 1.0;
+  int lost_after_frames = 150;
   bool keep_lost = false;
-  int min_hits = 2;
-  double overlap_share = 0.3;
+  int min_hits = 4;
+  double overlap_share = 0.5;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -59,13 +61,13 @@ struct TrackedObjectsConfig {
 struct SubmapsConfig {
   double max_weight = 10000.0;
   double min_weight = 0.5;
-  int inactive_after_frames = 15;
-  int confirm_frames = 3;
+  int inactive_after_frames = 5;
+  int confirm_frames = 2;
   double same_thing_share = 0.3;
-  double conflict_share = 0.3;
+  double conflict_share = 0.05;
   double match_share = 0.5;
-  double compared_share = 0.2;
-  double margin_voxels = 2.0;
+  double compared_share = 0.05;
+  double margin_voxels = 3.0;
 
   template <class Visitor>
   void describe(Visitor& visit) {
