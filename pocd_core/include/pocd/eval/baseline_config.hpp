@@ -59,14 +59,14 @@ struct TrackedObjectsConfig {
 };
 
 struct SubmapsConfig {
-  double max_weight = 10000.0;
-  double min_weight = 0.5;
+  double max_weight = 15.0;
+  double min_weight = 0.2;
   int inactive_after_frames = 5;
   int confirm_frames = 2;
   double same_thing_share = 0.3;
-  double conflict_share = 0.05;
-  double match_share = 0.5;
-  double compared_share = 0.05;
+  double conflict_share = 0.3;
+  double match_share = 0.3;
+  double compared_share = 0.1;
   double margin_voxels = 3.0;
 
   template <class Visitor>
