@@ -1,14 +1,15 @@
-// A fleet manager's view of one lane: says what comes to stand on it, and when it is free again.
-// usage: lane_watch DOMAIN WIDTH X1 Y1 X2 Y2 [X3 Y3 ...]   metres of the map frame; ends when
-// killed
+// A fleet manager's view of one lane: what comes to stand on it, what was seen to leave it, and
+// when nobody knows. Free is a lane with nothing on it, nothing unknown, and a component that
+// looks. usage: lane_watch DOMAIN WIDTH X1 Y1 X2 Y2 [X3 Y3 ...]   metres of the map frame; runs
+// until killed
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <pocd_dds/object_watch.hpp>
-#include <set>
 #include <vector>
 
 struct Lane {
@@ -34,20 +35,35 @@ int main(int argc, char** argv) {
   if (lane.xy.size() < 4 || lane.xy.size() % 2 != 0) return 2;
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
 
-  std::set<std::array<std::uint8_t, 16>> on_lane;
-  const auto leaves = [&](const pocd::WatchedObject& object) {
-    if (on_lane.erase(object.uuid) == 0) return;
-    std::printf("no longer blocked by %u, %zu left\n", to_index(object.state.id), on_lane.size());
+  // By uuid. Unknown: seen on the lane before the component restarted, and not seen since.
+  std::map<std::array<std::uint8_t, 16>, pocd::OrientedBox> on_lane, unknown;
+  const auto tell = [&](const char* what, const pocd::WatchedObject& object) {
+    for (const auto& [uuid, box] : on_lane) {  // a new run has new uuids: seen again, by its place
+      for (auto old = unknown.begin(); old != unknown.end();) {
+        const auto way = (old->second.pose.position_W - box.pose.position_W).head<2>();
+        const bool same = way.norm() < 0.5 * box.size_m.head<2>().minCoeff();
+        old = same ? unknown.erase(old) : std::next(old);
+      }
+    }
+    std::printf("%s %s %u: %zu on the lane, %zu unknown\n", what, object.class_name.c_str(),
+                to_index(object.state.id), on_lane.size(), unknown.size());
   };
   pocd::ObjectWatchOptions options;
   options.domain = std::atoi(argv[1]);
-  options.on_object =
-      [&](const pocd::WatchedObject& object) {  // new, or changed: it may have moved
-        if (!lane.has(object.state.box)) return leaves(object);
-        if (!on_lane.insert(object.uuid).second) return;
-        std::printf("blocked by %s %u\n", object.class_name.c_str(), to_index(object.state.id));
-      };
-  options.on_gone = [&](const pocd::WatchedObject& object, pocd::Gone) { leaves(object); };
+  options.on_object = [&](const pocd::WatchedObject& object) {  // new, or changed: may have moved
+    if (lane.has(object.state.box)) {
+      if (on_lane.insert_or_assign(object.uuid, object.state.box).second)
+        tell("blocked by", object);
+    } else if (on_lane.erase(object.uuid) > 0) {
+      tell("no longer blocked by", object);
+    }
+  };
+  options.on_gone = [&](const pocd::WatchedObject& object, pocd::Gone why) {
+    if (on_lane.erase(object.uuid) == 0) return;
+    if (why == pocd::Gone::kRemoved) return tell("no longer blocked by", object);
+    unknown[object.uuid] = object.state.box;  // nobody has looked: not free
+    tell("unknown since the component restarted:", object);
+  };
   options.on_event = [&](const pocd::ObjectEvent& event, const std::string&) {
     if (event.kind == pocd::EventKind::kUpdated || !lane.has(event.box)) return;
     static const char* const kinds[] = {"added", "updated", "moved", "removed"};
@@ -55,5 +71,9 @@ int main(int argc, char** argv) {
                 event.evidence.rule.c_str());
   };
   const pocd::ObjectWatch watch(options);
-  for (;;) pause();
+  for (int before = -1;; sleep(1)) {
+    const int present = watch.publisher_present();
+    if (present != before) std::puts(present ? "component is there" : "no component: nobody looks");
+    before = present;
+  }
 }

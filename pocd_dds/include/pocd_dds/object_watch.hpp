@@ -20,7 +20,9 @@ struct WatchedObject {
 
 enum class Gone {
   kRemoved,  ///< it was seen that it is not there any more, or it turned out to be another one
-  kReplaced  ///< its node was killed or has ended, and a new run, with names of its own, goes on
+  /// Its node was killed or has ended, and a new run, with names of its own, goes on. Nobody has
+  /// looked whether it is still there: its place is unknown and not free.
+  kReplaced
 };
 
 /// Callbacks may be empty. They are called one at a time, by the watch's thread, in the order in
