@@ -8,6 +8,7 @@
 #include "pocd/eval/state_truth.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
+#include "pocd/sim/truth.hpp"
 
 namespace pocd::bench {
 namespace {
@@ -61,6 +62,12 @@ FrameSet load_tabletop(std::size_t limit) {
   const std::filesystem::path folder = data_folder() + "/tabletop_states";
   if (is_missing(folder, set)) return set;
   read_all(*open_dataset(state_dataset(truth, folder)), limit, set);
+  const auto repeat = static_cast<std::size_t>(truth.frames_per_state);
+  for (const ExpectedState& state : expected_states(truth, folder)) {
+    std::vector<OrientedBox> boxes;
+    for (const ExpectedObject& object : state.objects) boxes.push_back(object.box);
+    set.objects.insert(set.objects.end(), repeat, boxes);
+  }
   return set;
 }
 
@@ -72,6 +79,9 @@ FrameSet load_circuit(std::size_t limit) {
   options.threads = 2;
   SimReader reader(*set.scenario, options);
   read_all(reader, limit, set);
+  std::vector<OrientedBox> boxes;
+  for (const TruthObject& object : objects_after(*set.scenario, 0)) boxes.push_back(object.box);
+  set.objects.assign(set.frames.size(), boxes);
   return set;
 }
 

@@ -16,6 +16,8 @@ struct FrameSet {
   std::vector<Frame> frames;  ///< empty: not there, `missing` says what
   std::string missing;
   std::optional<Scenario> scenario;  ///< of simulated frames: the truth
+  /// What really stands there, by frame; empty where nobody knows.
+  std::vector<std::vector<OrientedBox>> objects;
 };
 
 /// Folder of the recordings: POCD_TEST_DATA in the environment, or as configured.

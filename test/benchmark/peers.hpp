@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "found_objects.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/segmentation/organized_cloud.hpp"
@@ -22,7 +23,11 @@ class HashTsdf {
   ~HashTsdf();
   static bool available();
   void integrate(const Frame& frame);
-  OrientedPoints surface() const;
+  /// Its surface as far as these frames' pixels see it, the mean of what they see per voxel: by
+  /// raycast(), since fetchPointsNormals() gives every voxel that was observed, not those at the
+  /// surface. raycast() reads the voxel below a point instead of the nearest: rays begin half a
+  /// voxel higher to make up for it.
+  OrientedPoints surface(const std::vector<Frame>& frames) const;
 
  private:
   struct Impl;
@@ -37,6 +42,9 @@ class PclFrame {
   /// The textbook: voxel grid, largest plane by RANSAC taken away, Euclidean clusters of the rest.
   /// Returns the number of clusters.
   std::size_t clean_and_cluster(double leaf_m, double plane_m, double tolerance_m) const;
+  /// The same, as the cluster of each pixel of the cloud that this was made of.
+  Clusters clusters(const OrganizedCloud& cloud, double leaf_m, double plane_m,
+                    double tolerance_m) const;
 
  private:
   struct Impl;

@@ -1,3 +1,4 @@
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "peers.hpp"
@@ -26,14 +27,21 @@ cv::Matx33f intrinsics(const Frame& frame) {
           1};
 }
 
-Points to_points(const cv::Mat& rows) {
-  Points points;
-  for (int i = 0; i < rows.rows; ++i) {
-    const float* p = rows.ptr<float>(i);
-    points.emplace_back(p[0], p[1], p[2]);
+cv::Matx44f to_matrix(const Pose& pose) {
+  cv::Matx44f matrix;
+  for (int k = 0; k < 16; ++k) {
+    matrix(k / 4, k % 4) = static_cast<float>(pose.matrix()(k / 4, k % 4));
   }
-  return points;
+  return matrix;
 }
+
+cv::kinfu::Intr kinfu_intrinsics(const CameraModel& c) {
+  return {static_cast<float>(c.fx), static_cast<float>(c.fy), static_cast<float>(c.cx),
+          static_cast<float>(c.cy)};
+}
+
+// Rays are cast from every so many frames.
+constexpr std::size_t kRaycastStride = 10;
 
 }  // namespace
 
@@ -54,20 +62,47 @@ HashTsdf::HashTsdf(const TsdfConfig& config) : impl_(std::make_unique<Impl>()) {
 }
 
 void HashTsdf::integrate(const Frame& frame) {
-  cv::Matx44f pose;
-  for (int k = 0; k < 16; ++k) {
-    pose(k / 4, k % 4) = static_cast<float>(frame.T_W_C.matrix()(k / 4, k % 4));
-  }
-  const CameraModel& c = frame.camera;
-  const cv::kinfu::Intr intr(static_cast<float>(c.fx), static_cast<float>(c.fy),
-                             static_cast<float>(c.cx), static_cast<float>(c.cy));
-  impl_->volume->integrate(frame.depth_m, 1.0f, pose, intr, impl_->frames++);
+  impl_->volume->integrate(frame.depth_m, 1.0f, to_matrix(frame.T_W_C),
+                           kinfu_intrinsics(frame.camera), impl_->frames++);
 }
 
-OrientedPoints HashTsdf::surface() const {
-  cv::Mat points, normals;
-  impl_->volume->fetchPointsNormals(points, normals);
-  return {to_points(points), to_points(normals)};
+OrientedPoints HashTsdf::surface(const std::vector<Frame>& frames) const {
+  struct Mean {
+    Eigen::Vector3f points_W = Eigen::Vector3f::Zero(), normals_W = Eigen::Vector3f::Zero();
+    float count = 0.0f;
+  };
+  const float voxel_m = impl_->volume->voxelSize;
+  std::map<BlockKey, Mean> cells;
+  for (std::size_t i = 0; i < frames.size(); i += kRaycastStride) {
+    const Frame& frame = frames[i];
+    Pose shifted = frame.T_W_C;
+    shifted.translation().array() += 0.5 * voxel_m;
+    cv::Mat points, normals;
+    impl_->volume->raycast(to_matrix(shifted), kinfu_intrinsics(frame.camera), frame.depth_m.size(),
+                           points, normals);
+    const Eigen::Isometry3f T_W_C = frame.T_W_C.cast<float>();  // the shift undone
+    for (int v = 0; v < points.rows; ++v) {
+      for (int u = 0; u < points.cols; ++u) {
+        const float* p = points.ptr<float>(v) + 4 * u;
+        const float* n = normals.ptr<float>(v) + 4 * u;
+        const Eigen::Vector3f point_W = T_W_C * Eigen::Vector3f(p[0], p[1], p[2]);
+        const Eigen::Vector3f normal_W = T_W_C.linear() * Eigen::Vector3f(n[0], n[1], n[2]);
+        if (!point_W.allFinite() || !normal_W.allFinite()) continue;
+        const Eigen::Vector3f cell = (point_W / voxel_m).array().floor();
+        Mean& mean = cells[{static_cast<int>(cell.x()), static_cast<int>(cell.y()),
+                            static_cast<int>(cell.z())}];
+        mean.points_W += point_W;
+        mean.normals_W += normal_W;
+        mean.count += 1.0f;
+      }
+    }
+  }
+  OrientedPoints surface;
+  for (const auto& [key, mean] : cells) {
+    surface.points_W.push_back(mean.points_W / mean.count);
+    surface.normals_W.push_back(mean.normals_W.normalized());
+  }
+  return surface;
 }
 
 cv::Mat opencv_points(const Frame& frame) {
@@ -105,7 +140,7 @@ struct HashTsdf::Impl {};
 bool HashTsdf::available() { return false; }
 HashTsdf::HashTsdf(const TsdfConfig&) {}
 void HashTsdf::integrate(const Frame&) {}
-OrientedPoints HashTsdf::surface() const { return {}; }
+OrientedPoints HashTsdf::surface(const std::vector<Frame>&) const { return {}; }
 cv::Mat opencv_points(const Frame&) { return {}; }
 cv::Mat opencv_normals(const Frame&, const cv::Mat&) { return {}; }
 int opencv_planes(const Frame&, const cv::Mat&, const cv::Mat&) { return 0; }

@@ -48,6 +48,12 @@ class Series {
   std::vector<double> cpu_, wall_;
 };
 
+/// Which of three has its turn: over six frames each is first, and after each of the others, as
+/// often as they.
+inline std::size_t in_turn(std::size_t frame, std::size_t turn) {
+  return (frame + (frame / 3 % 2 == 0 ? turn : 2 * turn)) % 3;
+}
+
 /// Times one call of `work`.
 template <class Work>
 void time_into(Series& series, std::size_t frame, const Work& work) {

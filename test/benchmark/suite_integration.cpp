@@ -29,8 +29,8 @@ Run integrate_all(const FrameSet& set, const TsdfConfig& config, int passes) {
       const Frame& frame = set.frames[i];
       const IntegrationInput input{&frame, owners[i].data(), frame.camera.width / kOwnerStride,
                                    frame.camera.height / kOwnerStride, kOwnerStride};
-      for (std::size_t turn = 0; turn < 3; ++turn) {  // nobody is always the first
-        switch ((i + turn) % 3) {
+      for (std::size_t turn = 0; turn < 3; ++turn) {
+        switch (in_turn(i, turn)) {
           case 0:
             time_into(run.one, i, [&] { map_1.integrate(input, pool_1); });
             break;
@@ -45,7 +45,7 @@ Run integrate_all(const FrameSet& set, const TsdfConfig& config, int passes) {
     if (pass + 1 < passes) continue;
     run.blocks = map_1.block_count();
     run.surface = surface_points(map_1, config.min_publish_weight);
-    run.opencv_surface = hash.surface();
+    run.opencv_surface = hash.surface(set.frames);
   }
   return run;
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pocd/common/check.hpp"
+#include "region.hpp"
 
 namespace pocd {
 namespace {
@@ -14,9 +15,6 @@ namespace {
 constexpr double kMaxCells = 64e6;
 
 constexpr std::uint32_t kNoOwner = 0;
-
-// Blocks per piece of the search for seen ones, about 15 microseconds.
-constexpr std::size_t kNearGrain = 256;
 
 // Points along a ray through the band: at most half a block apart, so that a block that lies
 // between two points is cut at a corner only and neighbouring rays find it.
@@ -101,7 +99,7 @@ void BlockFinder::scan_tile_row(int tile_row) {
   const float max_depth = static_cast<float>(config_.max_depth_m);
   float* far = tile_far_.data() + static_cast<std::ptrdiff_t>(tile_row) * tiles_x_;
   const int samples = static_cast<int>(columns_.size());
-  const auto per_tile = static_cast<unsigned>(kTile_px / step_px_);
+  const int per_tile = kTile_px / step_px_;
   alignas(64) float depth[kBandBatch];
   std::int32_t* cells = cells_.data() + static_cast<std::ptrdiff_t>(tile_row) * points * kBandBatch;
 
@@ -124,13 +122,18 @@ void BlockFinder::scan_tile_row(int tile_row) {
       const int count = std::min(kBandBatch, samples - first);
       sample_row(image_row, owner_row, columns_.data() + first, owner_columns_.data() + first,
                  max_depth, count, depth);
-      for (int i = 0; i < count; ++i) {
-        float& tile = far[static_cast<unsigned>(first + i) / per_tile];
-        tile = depth[i] > tile ? depth[i] : tile;
-        if (config_.clear_beyond_limit && image_row[columns_[first + i]] > max_depth &&
-            owner_row[owner_columns_[first + i]] != IntegrationInput::kSkip) {
-          tile = max_depth;
+      for (int i = 0; i < count;) {
+        const int tile = (first + i) / per_tile;
+        const int end = std::min(count, (tile + 1) * per_tile - first);
+        float farthest = far[tile];
+        for (; i < end; ++i) {
+          farthest = depth[i] > farthest ? depth[i] : farthest;
+          if (config_.clear_beyond_limit && image_row[columns_[first + i]] > max_depth &&
+              owner_row[owner_columns_[first + i]] != IntegrationInput::kSkip) {
+            farthest = max_depth;
+          }
         }
+        far[tile] = farthest;
       }
       band_cells(row, depth, count, static_cast<float>(columns_[first]),
                  static_cast<float>(step_px_), cells);
@@ -193,13 +196,21 @@ float BlockFinder::farthest_depth(const Eigen::Vector3d& center_C, double radius
   return far_depth;
 }
 
-void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp, ThreadPool& pool,
+bool BlockFinder::in_band(const BlockKey& key) const {
+  const int x = key.x - first_.x, y = key.y - first_.y, z = key.z - first_.z;
+  if (x < 0 || x >= size_x_ || y < 0 || y >= size_y_ || z < 0 || z >= size_z_) return false;
+  return marks_[(static_cast<std::size_t>(z) * size_y_ + y) * size_x_ + x] != 0;
+}
+
+void BlockFinder::append_seen(BlockStore& store, ThreadPool& pool,
                               std::vector<std::uint32_t>& slots) {
   const Pose T_C_W = input_->frame->T_W_C.inverse();
   constexpr int kShift = BlockStore::kRegionShift;
   const double block_radius = 0.5 * std::sqrt(3.0) * block_m_;
   const double region_radius = block_radius * (1 << kShift);
-  near_.clear();
+  regions_.clear();
+  seen_begin_.clear();
+  std::size_t members = 0;
   for (int z = first_.z >> kShift; z <= (first_.z + size_z_ - 1) >> kShift; ++z) {
     for (int y = first_.y >> kShift; y <= (first_.y + size_y_ - 1) >> kShift; ++y) {
       for (int x = first_.x >> kShift; x <= (first_.x + size_x_ - 1) >> kShift; ++x) {
@@ -208,28 +219,39 @@ void BlockFinder::append_seen(BlockStore& store, std::uint64_t stamp, ThreadPool
         const Eigen::Vector3d center_W =
             (Eigen::Vector3d(x, y, z).array() + 0.5) * block_m_ * (1 << kShift);
         if (farthest_depth(T_C_W * center_W, region_radius) == 0.0f) continue;
-        const std::vector<std::uint32_t>& members = store.enter(*region);
-        near_.insert(near_.end(), members.begin(), members.end());
+        store.enter(*region);
+        regions_.push_back(region);
+        seen_begin_.push_back(members);
+        members += region->memory->members.size();
       }
     }
   }
   // Half the extent of a block along the optical axis.
   const double half_z = 0.5 * block_m_ * T_C_W.linear().row(2).cwiseAbs().sum();
   const double truncation = config_.truncation_m();
-  const BlockStore& blocks = store;
-  near_seen_.resize(near_.size());
-  pool.parallel_for(near_.size(), kNearGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const BlockKey& key = blocks.block(near_[n]).key;
-      const Eigen::Vector3d block_W =
-          (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * block_m_;
-      const Eigen::Vector3d block_C = T_C_W * block_W;
-      const float far = farthest_depth(block_C, block_radius);
-      near_seen_[n] = far > 0.0f && block_C.z() - half_z < far + truncation;
+  seen_.resize(members);
+  pool.parallel_for(regions_.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r) {
+      std::uint8_t* seen = seen_.data() + seen_begin_[r];
+      // Keys from the region: those in the blocks lie far apart.
+      for (const std::uint16_t place : regions_[r]->memory->places) {
+        const BlockKey key = regions_[r]->block_at(place);
+        std::uint8_t& here = *seen++;
+        here = 0;
+        if (in_band(key)) continue;
+        const Eigen::Vector3d block_W =
+            (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * block_m_;
+        const Eigen::Vector3d block_C = T_C_W * block_W;
+        const float far = farthest_depth(block_C, block_radius);
+        here = far > 0.0f && block_C.z() - half_z < far + truncation;
+      }
     }
   });
-  for (std::size_t n = 0; n < near_.size(); ++n) {
-    if (near_seen_[n] && store.visit(near_[n], stamp)) slots.push_back(near_[n]);
+  for (std::size_t r = 0; r < regions_.size(); ++r) {
+    const std::uint8_t* seen = seen_.data() + seen_begin_[r];
+    for (const std::uint32_t slot : regions_[r]->memory->members) {
+      if (*seen++) slots.push_back(slot);
+    }
   }
 }
 

@@ -23,17 +23,17 @@ class BlockFinder {
   /// Keys of the marked cells, canonical order.
   const std::vector<BlockKey>& band();
 
-  /// Allocated blocks not yet visited with `stamp` that reach into the space that the frame saw,
-  /// free or within the band (the sampled rays miss blocks of which they would cut only a corner);
-  /// visits them.
-  void append_seen(BlockStore& store, std::uint64_t stamp, ThreadPool& pool,
-                   std::vector<std::uint32_t>& slots);
+  /// Allocated blocks outside of the band that reach into the space that the frame saw, free or
+  /// within the truncation distance (the sampled rays miss blocks of which they would cut only a
+  /// corner).
+  void append_seen(BlockStore& store, ThreadPool& pool, std::vector<std::uint32_t>& slots);
 
  private:
   static constexpr int kTile_px = 16;
 
   void place_grid();
   void scan_tile_row(int tile_row);
+  bool in_band(const BlockKey& key) const;
   /// Farthest sampled depth over the image area of a sphere, 0 when it is out of view.
   float farthest_depth(const Eigen::Vector3d& center_C, double radius) const;
 
@@ -49,8 +49,9 @@ class BlockFinder {
   std::vector<float> tile_far_;
   std::vector<std::int32_t> cells_;  // scratch of scan_tile_row, one part per row
   std::vector<BlockKey> band_;
-  std::vector<std::uint32_t> near_;      // blocks of regions in view
-  std::vector<std::uint8_t> near_seen_;  // whether they reach into what was seen
+  std::vector<const BlockStore::Region*> regions_;  // in view
+  std::vector<std::size_t> seen_begin_;             // where those of each region begin in seen_
+  std::vector<std::uint8_t> seen_;  // by member: it reaches into what was seen, outside of the band
 };
 
 }  // namespace pocd

@@ -49,11 +49,10 @@ void BlockStore::see(Region& region) {
   newest_ = &region;
 }
 
-const std::vector<std::uint32_t>& BlockStore::enter(Region& region) {
+void BlockStore::enter(Region& region) {
   if (!region.memory) bring_back(region);
   see(region);
   visits_.blocks += region.memory->members.size();
-  return region.memory->members;
 }
 
 std::uint32_t BlockStore::find(const BlockKey& key) const {
@@ -91,11 +90,11 @@ std::uint32_t BlockStore::allocate(Region& region, const BlockKey& key) {
   in.free_slots.pop_back();
   in.slot_of[Region::place(key)] = slot;
   Meta& m = meta(slot);
-  m.stamp = 0;
   m.used = true;
   m.dirty_list = 0;
   m.position_in_region = static_cast<std::uint32_t>(in.members.size());
   in.members.push_back(slot);
+  in.places.push_back(static_cast<std::uint16_t>(Region::place(key)));
   block(slot).key = key;
   return slot;
 }
@@ -159,8 +158,10 @@ void BlockStore::drop(std::uint32_t slot) {
   Region::InMemory& in = *r.memory;
   const std::uint32_t place = Region::place(block(slot).key);
   in.members[m.position_in_region] = in.members.back();
+  in.places[m.position_in_region] = in.places.back();
   meta(in.members.back()).position_in_region = m.position_in_region;
   in.members.pop_back();
+  in.places.pop_back();
   in.slot_of[place] = kNoSlot;
   in.free_slots.push_back(slot);
   r.present.reset(place);
@@ -205,10 +206,16 @@ bool BlockStore::lacks_owner(std::uint32_t slot, std::uint32_t owner) const {
 }
 
 bool BlockStore::lacks_owners(std::uint32_t slot) const {
+  const std::uint32_t* row = block(slot).owner.data();
   std::uint32_t last = 0;
-  for (const std::uint32_t owner : block(slot).owner) {
-    if (owner != last && lacks_owner(slot, owner)) return true;
-    last = owner;
+  for (int r = 0; r < VoxelBlock::kVoxels / VoxelBlock::kSide; ++r, row += VoxelBlock::kSide) {
+    std::uint32_t other = 0;  // most rows have the owner of the one before
+    for (int i = 0; i < VoxelBlock::kSide; ++i) other |= row[i] ^ last;
+    if (other == 0) continue;
+    for (int i = 0; i < VoxelBlock::kSide; ++i) {
+      if (row[i] != last && lacks_owner(slot, row[i])) return true;
+      last = row[i];
+    }
   }
   return false;
 }

@@ -62,19 +62,11 @@ class BlockStore {
   /// The region of this key (block key >> kRegionShift); null when it has no blocks.
   Region* region(const BlockKey& region_key);
   const Region* region(const BlockKey& region_key) const;
-  /// Brings the region back to memory if need be, sees it; slots of its blocks.
-  const std::vector<std::uint32_t>& enter(Region& region);
+  /// Brings the region back to memory if need be, sees it.
+  void enter(Region& region);
 
   /// All blocks, those on disk too, in canonical order.
   std::vector<BlockKey> sorted_keys() const;
-
-  /// True once per stamp (> 0) and slot: tells whether this pass has met the block before.
-  bool visit(std::uint32_t slot, std::uint64_t stamp) {
-    Meta& m = meta(slot);
-    if (m.stamp == stamp) return false;
-    m.stamp = stamp;
-    return true;
-  }
 
   /// Notes that the block may hold voxels of the owner (0 is not noted).
   void note_owner(std::uint32_t slot, std::uint32_t owner);
@@ -107,7 +99,6 @@ class BlockStore {
   static constexpr std::size_t kSpareChunks = 8;
 
   struct Meta {
-    std::uint64_t stamp = 0;
     std::uint32_t position_in_region = 0;
     /// The list of dirty blocks that this one is or was last in; 0: never in any, so that nobody
     /// has to hear of its end.

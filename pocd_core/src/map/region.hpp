@@ -10,6 +10,7 @@ struct BlockStore::Region {
     InMemory() { slot_of.fill(kNoSlot); }
     std::array<std::uint32_t, kRegionBlocks> slot_of;  // by place
     std::vector<std::uint32_t> members, free_slots, chunks;
+    std::vector<std::uint16_t> places;  // of the members
   };
 
   BlockKey key;                        // block key >> kRegionShift

@@ -66,14 +66,9 @@ void TsdfIntegrator::integrate(const TsdfConfig& config, const IntegrationInput&
   prepare(config, input);
   finder_.scan(config, input, pool);
 
-  ++stamp_;
   slots_.clear();
-  for (const BlockKey& key : finder_.band()) {
-    const std::uint32_t slot = store.find_or_allocate(key);
-    store.visit(slot, stamp_);
-    slots_.push_back(slot);
-  }
-  finder_.append_seen(store, stamp_, pool, slots_);
+  for (const BlockKey& key : finder_.band()) slots_.push_back(store.find_or_allocate(key));
+  finder_.append_seen(store, pool, slots_);
 
   outcomes_.resize(slots_.size());
   const Pose T_C_W = input.frame->T_W_C.inverse();

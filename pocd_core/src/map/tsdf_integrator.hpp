@@ -26,7 +26,6 @@ class TsdfIntegrator {
   KernelFrame kernel_;
   std::vector<std::uint32_t> slots_;
   std::vector<BlockOutcome> outcomes_;
-  std::uint64_t stamp_ = 0;
   std::uint32_t no_owner_ = 0;
 };
 

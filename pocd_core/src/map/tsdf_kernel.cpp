@@ -47,13 +47,15 @@ POCD_KERNEL void find_pixels(const KernelFrame& f, float bx, float by, float bz,
 }
 
 // Projective signed distance of each voxel, kBehind where no usable pixel sees it. A pixel beyond
-// max_depth is usable for free space up to clear_depth.
-POCD_KERNEL void look_up(float max_depth, float clear_depth, float truncation,
+// max_depth is usable for free space up to clear_depth. Returns whether the frame reaches any: in
+// front of the surface or within the band behind it.
+POCD_KERNEL bool look_up(float max_depth, float clear_depth, float truncation,
                          const float* __restrict depth, const std::uint32_t* __restrict owners,
                          const std::int32_t* __restrict pixel,
                          const std::int32_t* __restrict owner_pixel,
                          const float* __restrict minus_z, float* __restrict distance,
                          std::uint32_t* __restrict owner) {
+  std::int32_t reached = 0;
   for (int i = 0; i < kVoxels; ++i) {
     const float d = depth[pixel[i]];
     const std::uint32_t o = owners[owner_pixel[i]];
@@ -62,9 +64,22 @@ POCD_KERNEL void look_up(float max_depth, float clear_depth, float truncation,
     const float clear = s >= truncation ? near : kBehind;
     const float in_range = d <= max_depth ? s : clear;
     const float seen = d > 0.0f ? in_range : kBehind;
-    distance[i] = o != IntegrationInput::kSkip ? seen : kBehind;
+    const float s_usable = o != IntegrationInput::kSkip ? seen : kBehind;
+    distance[i] = s_usable;
     owner[i] = o;
+    reached |= s_usable >= -truncation ? 1 : 0;
   }
+  return reached != 0;
+}
+
+// Whether some observed voxel is no free space.
+POCD_KERNEL bool holds_surface(const std::int16_t* __restrict tsdf,
+                               const std::uint16_t* __restrict weight) {
+  std::int32_t any = 0;
+  for (int i = 0; i < kVoxels; ++i) {
+    any |= (weight[i] > 0 ? 1 : 0) & (tsdf[i] < kFreeTsdf ? 1 : 0);
+  }
+  return any != 0;
 }
 
 // Running weighted average of the voxels in front of the surface and in the band behind it. `state`
@@ -136,16 +151,33 @@ POCD_KERNEL bool own(float band, const float* __restrict distance,
   return changed != 0;
 }
 
+// Asks for the memory that follows before it is needed.
+void fetch(const void* memory, std::size_t bytes) {
+#if defined(__GNUC__)
+  for (std::size_t at = 0; at < bytes; at += 64) {
+    __builtin_prefetch(static_cast<const char*>(memory) + at, 1);
+  }
+#endif
+}
+
 // Whether a pixel next to the voxel's saw something that is not clearly behind the voxel.
 bool beside_an_edge(const KernelFrame& f, float x, float y, float z) {
   const int u = static_cast<int>(x / z * f.fx + f.cx + 0.5f);
   const int v = static_cast<int>(y / z * f.fy + f.cy + 0.5f);
   const int width = static_cast<int>(f.width), height = static_cast<int>(f.height);
+  const int first_u = std::max(0, u - kEdgeGuard_px);
+  const int last_u = std::min(width - 1, u + kEdgeGuard_px);
+  // A row without branches: what the pixels hold is not to be guessed.
+  const auto near = [&](const float* row, int count) {
+    bool any = false;
+    for (int a = 0; a < count; ++a) any |= (row[a] > 0.0f) & (row[a] - z < f.truncation);
+    return any;
+  };
+  constexpr int kWhole = 2 * kEdgeGuard_px + 1;
+  const int count = last_u - first_u + 1;
   for (int b = std::max(0, v - kEdgeGuard_px); b <= std::min(height - 1, v + kEdgeGuard_px); ++b) {
-    for (int a = std::max(0, u - kEdgeGuard_px); a <= std::min(width - 1, u + kEdgeGuard_px); ++a) {
-      const float d = f.depth[b * f.depth_stride + a];
-      if (d > 0.0f && d - z < f.truncation) return true;
-    }
+    const float* row = f.depth + b * f.depth_stride + first_u;
+    if (count == kWhole ? near(row, kWhole) : near(row, count)) return true;
   }
   return false;
 }
@@ -155,11 +187,10 @@ bool beside_an_edge(const KernelFrame& f, float x, float y, float z) {
 // part in max_weight / 2, but log2(max_weight) + 1 frames in a row empty it.
 void carve(const KernelFrame& f, float bx, float by, float bz, const std::int32_t* state,
            VoxelBlock& block, BlockOutcome& outcome) {
-  for (int i = 0; i < kVoxels; ++i) {
-    if (!(state[i] & kContradicted)) continue;
+  const auto carve_voxel = [&](int i) {
     if (beside_an_edge(f, bx + f.offset_x[i], by + f.offset_y[i], bz + f.offset_z[i])) {
       outcome.has_surface = true;
-      continue;
+      return;
     }
     const int w = block.weight[i] / 2;
     const int t = (block.tsdf[i] * w + static_cast<int>(kTsdfScale)) / (w + 1);
@@ -175,6 +206,14 @@ void carve(const KernelFrame& f, float bx, float by, float bz, const std::int32_
       outcome.has_surface = true;
     }
     outcome.changed = true;
+  };
+  for (int row = 0; row < kVoxels; row += VoxelBlock::kSide) {
+    std::int32_t any = 0;  // most rows have none
+    for (int k = 0; k < VoxelBlock::kSide; ++k) any |= state[row + k];
+    if (!(any & kContradicted)) continue;
+    for (int k = 0; k < VoxelBlock::kSide; ++k) {
+      if (state[row + k] & kContradicted) carve_voxel(row + k);
+    }
   }
 }
 
@@ -186,9 +225,16 @@ BlockOutcome integrate_block(const KernelFrame& frame, float x, float y, float z
   alignas(64) float minus_z[kVoxels], distance[kVoxels];
   alignas(64) std::uint32_t owner[kVoxels];
   BlockOutcome outcome;
+  fetch(block.tsdf.data(), sizeof block.tsdf);
+  fetch(block.weight.data(), sizeof block.weight);
   find_pixels(frame, x, y, z, pixel, owner_pixel, minus_z);
-  look_up(frame.max_depth, frame.clear_depth, frame.truncation, frame.depth, frame.owners, pixel,
-          owner_pixel, minus_z, distance, owner);
+  // A third of the blocks near the view lie behind what is seen.
+  if (!look_up(frame.max_depth, frame.clear_depth, frame.truncation, frame.depth, frame.owners,
+               pixel, owner_pixel, minus_z, distance, owner)) {
+    outcome.has_surface = holds_surface(block.tsdf.data(), block.weight.data());
+    return outcome;
+  }
+  fetch(block.owner.data(), sizeof block.owner);
   const float free_weight = std::min(frame.max_weight, static_cast<float>(kFreeWeight));
   const bool contradicted = average(frame.truncation, frame.max_weight, free_weight, distance,
                                     block.tsdf.data(), block.weight.data(), state);
