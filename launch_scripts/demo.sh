@@ -39,7 +39,8 @@ failed() {
   exit 1
 }
 
-pocd_mirror "${bus[@]}" --until-end --timeout 280 --output "$output" >"$output/pocd_mirror.log" 2>&1 &
+# From the stamp at which the second lap begins, changes are drawn into the picture.
+pocd_mirror "${bus[@]}" --until-end --timeout 280 --changes-since 14 --output "$output" >"$output/pocd_mirror.log" 2>&1 &
 mirror=$! && processes+=("$mirror")
 pocd_node "${bus[@]}" --config config/simulated.yaml --robot robot1 --robot robot2 --lossless \
   >"$output/pocd_node.log" 2>&1 &
@@ -57,5 +58,5 @@ tail -n 1 "$output/pocd_mirror.log"
 echo
 pocd_demo_report --scenario "$scenario" --events "$output/events.csv" | tee "$output/report.txt"
 echo
-echo "picture of the map: $output/birdseye.png (objects from red, changing, to green, stationary)"
+echo "picture of the map: $output/birdseye.png (dashed red: where objects were; blue: new ones)"
 echo "surface: $output/map.ply   events: $output/events.csv   logs: $output/*.log"

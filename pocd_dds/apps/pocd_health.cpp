@@ -23,11 +23,12 @@ std::string waiting(const NodeHealth& health) {
 
 void print(const NodeHealth& health) {
   const std::string waits_for = waiting(health);
-  std::printf("%s %s: %s%s%llu frames processed, %u objects, map version %llu\n",
+  std::printf("%s %s: %s%s%llu frames processed, %llu dropped, %u objects, map version %llu\n",
               health.name().c_str(), health.level() < 2 ? "is up" : "fails",
               health.message().c_str(),
               waits_for.empty() ? ", " : (", " + waits_for + ", ").c_str(),
-              static_cast<unsigned long long>(health.frames_processed()), health.objects(),
+              static_cast<unsigned long long>(health.frames_processed()),
+              static_cast<unsigned long long>(health.frames_dropped()), health.objects(),
               static_cast<unsigned long long>(health.map_version()));
 }
 

@@ -1,6 +1,7 @@
 // Follows the published map into a copy and writes it to files.
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <map>
 
 #include "apps/common.hpp"
@@ -18,6 +19,7 @@ struct Options {
   bool until_in_step = false;
   std::optional<std::uint64_t> expect_version;
   std::optional<double> timeout_s;
+  std::optional<double> changes_since_s;  ///< data time
 };
 
 std::string describe(const pocd::MirrorStatus& status) {
@@ -45,13 +47,16 @@ bool reached(const Options& options, const pocd::MirrorStatus& status) {
   return options.until_in_step && status.in_step && status.version > 0;
 }
 
-void write_files(const pocd::MirrorContents& contents, const std::filesystem::path& folder) {
+void write_files(const pocd::MirrorContents& contents, const std::filesystem::path& folder,
+                 std::vector<pocd::BirdseyeChange> changes) {
   std::filesystem::create_directories(folder);
   const pocd::Mesh mesh =
       pocd::extract_mesh(contents.tiles, contents.voxel_size_m, contents.truncation_m);
   pocd::write_ply(mesh, pocd::appearance_by_stationarity(contents.objects), folder / "map.ply");
   if (!mesh.vertices_W.empty()) {
-    pocd::write_birdseye(mesh, contents.objects, folder / "birdseye.png");
+    pocd::BirdseyeOptions picture;
+    picture.changes = std::move(changes);
+    pocd::write_birdseye(mesh, contents.objects, folder / "birdseye.png", picture);
   }
   pocd::write_objects_csv(
       contents.objects, [&](pocd::ClassId id) { return contents.class_names.at(id); },
@@ -61,11 +66,13 @@ void write_files(const pocd::MirrorContents& contents, const std::filesystem::pa
 int follow(Options options) {
   using std::chrono::milliseconds;
   std::optional<pocd::EventsCsv> events;
+  std::vector<pocd::ObjectEvent> heard;
   if (!options.output.empty()) {
     std::filesystem::create_directories(options.output);
     events.emplace(options.output / "events.csv");
-    options.mirror.on_event = [&events](const pocd::ObjectEvent& event, const std::string& name) {
+    options.mirror.on_event = [&](const pocd::ObjectEvent& event, const std::string& name) {
       events->add(event, name);
+      if (options.changes_since_s) heard.push_back(event);
     };
   }
   auto mirror = std::make_unique<pocd::MapMirror>(options.mirror);
@@ -90,7 +97,17 @@ int follow(Options options) {
   if (events) events->close();
   print(contents.status);
   if (!options.output.empty() && contents.status.epoch != 0) {
-    write_files(contents, options.output);
+    const double since_s = options.changes_since_s.value_or(0.0);
+    for (const pocd::ObjectSnapshot& object : contents.objects) {  // boxes as they are known by now
+      pocd::ObjectEvent known;
+      known.kind = pocd::EventKind::kUpdated;
+      known.stamp_ns = std::numeric_limits<pocd::StampNs>::max();
+      known.object = object.id;
+      known.box = object.box;
+      heard.push_back(known);
+    }
+    write_files(contents, options.output,
+                pocd::changes_since(heard, static_cast<pocd::StampNs>(1e9 * since_s)));
   }
   if (over() && !done) {
     spdlog::error("gave up after {} s", *options.timeout_s);
@@ -111,6 +128,9 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--output", options.output,
                  "Folder for events.csv, and at the end map.ply, birdseye.png and objects.csv");
+  app.add_option("--changes-since", options.changes_since_s,
+                 "Draw into birdseye.png what was added, moved or removed from this stamp on [s]")
+      ->check(CLI::NonNegativeNumber);
   app.add_flag("--until-end", options.until_end,
                "End when the publisher has ended its run or has gone");
   app.add_flag("--until-in-step", options.until_in_step,

@@ -3,10 +3,11 @@
 # segmentation) over loopback in real time to pocd_node on two cores, and prints the time from the last image
 # of a frame received to its map delta written, frames lost, and where CPU time went; without and with a
 # pocd_mirror that follows the map on the same cores. By hand, not a test.
-# usage: bus_latency.sh BIN_DIR CONFIG SCENARIO [SECONDS (20)]
+# usage: bus_latency.sh BIN_DIR CONFIG SCENARIO [SECONDS (20) [ROBOTS ...]]
+# With ROBOTS: so many robots at 15 Hz, one number after the other; how many one node carries.
 set -euo pipefail
 
-bin=$1 config=$2 scenario=$3 seconds=${4:-20}
+bin=$1 config=$2 scenario=$3 seconds=${4:-20} fleets=("${@:5}")
 here=$(dirname "${BASH_SOURCE[0]}")
 work=$(mktemp -d "${TMPDIR:-/tmp}/bus_latency.XXXXXX")
 export SKIP_DEFAULT_XML=1
@@ -37,6 +38,7 @@ measure() {
   done
   taskset -c 0,1 "$bin/pocd_play" "${bus[@]}" "$work/run.mcap" >"$work/play.log" 2>&1
   sleep 1
+  health=$("$bin/pocd_health" "${bus[@]}" || true)
   kill -TERM "$node"
   wait "$node" || true
   node=""
@@ -46,6 +48,8 @@ measure() {
   taken=$(($(wc -l <"$work/latency.csv") - 1))
   echo "$robots robot(s) at $rate Hz, $followers copies of the map ($in_step in step at the end), load average $(cut -d' ' -f1 /proc/loadavg)"
   echo "  frames sent $sent, through to a delta $taken, lost $((sent - taken))"
+  echo "  by robot: $(tail -n +2 "$work/latency.csv" | cut -d, -f1 | sort -V | uniq -c | awk '{printf "%s %d  ", $2, $1}')"
+  echo "  $health"
   echo "  last image to delta written (wanted: p99 <= $limit_ms ms): $(quantiles "$work/latency.csv" 6)"
   echo "    of that waiting for the other robot and the queue: $(quantiles "$work/latency.csv" 3)"
   echo "    pipeline:                                         $(quantiles "$work/latency.csv" 4)"
@@ -53,13 +57,24 @@ measure() {
   sed -n 's/.*CPU per frame/  CPU per frame/p' "$work/node.log"
 }
 
-# ROBOTS RATE_HZ LIMIT_MS: alone, then with somebody who follows the map.
-measure_both() {
+record() {
   "$bin/make_robot_recording" "$scenario" "$work/run.mcap" "$1" "$2" "$seconds"
   cat "$work/run.mcap" >/dev/null  # from memory
+}
+
+# ROBOTS RATE_HZ LIMIT_MS: alone, then with somebody who follows the map.
+measure_both() {
+  record "$1" "$2"
   measure "$@" 0
   measure "$@" 1
 }
 
-measure_both 2 15 66
-measure_both 1 30 33
+if ((${#fleets[@]} > 0)); then
+  for robots in "${fleets[@]}"; do
+    record "$robots" 15
+    measure "$robots" 15 66 0
+  done
+else
+  measure_both 2 15 66
+  measure_both 1 30 33
+fi

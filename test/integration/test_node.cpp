@@ -75,7 +75,7 @@ TEST(Health, FreshNodeIsUpAndSaysWhatItWaitsFor) {
   EXPECT_EQ(up.exit_code, 0) << up.out;
   EXPECT_EQ(up.out,
             "north_hall is up: running, robot1: waiting for its first frame, 0 frames processed, 0 "
-            "objects, map version 0\n");
+            "dropped, 0 objects, map version 0\n");
   const CommandResult other = ask("south_hall", "0.5");
   EXPECT_EQ(other.exit_code, 1);
   EXPECT_NE(other.out.find("south_hall was not heard on domain"), std::string::npos) << other.out;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "birdseye_canvas.hpp"
+#include "birdseye_changes.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {
@@ -26,18 +27,10 @@ double ground_height(const Mesh& mesh) {
   return *at;
 }
 
-std::array<Eigen::Vector2d, 4> corners(const OrientedBox& box) {
-  const double c = std::cos(box.pose.yaw_rad), s = std::sin(box.pose.yaw_rad);
-  const Eigen::Vector2d along = 0.5 * box.size_m.x() * Eigen::Vector2d(c, s);
-  const Eigen::Vector2d across = 0.5 * box.size_m.y() * Eigen::Vector2d(-s, c);
-  const Eigen::Vector2d center = box.pose.position_W.head<2>();
-  return {center + along + across, center - along + across, center - along - across,
-          center + along - across};
-}
-
 // Area to show: everything drawn, with a margin.
-void find_area(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects, double lowest,
-               double highest, Eigen::Vector2d& low, Eigen::Vector2d& high) {
+void find_area(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
+               const std::vector<BirdseyeChange>& changes, double lowest, double highest,
+               Eigen::Vector2d& low, Eigen::Vector2d& high) {
   low.setConstant(1e9);
   high.setConstant(-1e9);
   for (const Eigen::Vector3f& p : mesh.vertices_W) {
@@ -45,11 +38,16 @@ void find_area(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects, dou
     low = low.cwiseMin(p.head<2>().cast<double>());
     high = high.cwiseMax(p.head<2>().cast<double>());
   }
-  for (const ObjectSnapshot& object : objects) {
-    for (const Eigen::Vector2d& corner : corners(object.box)) {
+  const auto show = [&](const OrientedBox& box) {
+    for (const Eigen::Vector2d& corner : floor_corners(box)) {
       low = low.cwiseMin(corner);
       high = high.cwiseMax(corner);
     }
+  };
+  for (const ObjectSnapshot& object : objects) show(object.box);
+  for (const BirdseyeChange& change : changes) {
+    if (change.before) show(*change.before);
+    if (change.after) show(*change.after);
   }
   if (low.x() > high.x()) low.setConstant(-1.0), high.setConstant(1.0);
   const double margin = std::max(0.03 * (high - low).maxCoeff(), 0.05);
@@ -157,7 +155,7 @@ void outline(const std::vector<ObjectSnapshot>& objects, BirdseyeCanvas& canvas)
   constexpr int kShift = 4;  // fractional bits of the polygon's corners
   for (const ObjectSnapshot& object : objects) {
     std::vector<cv::Point> polygon;
-    for (const Eigen::Vector2d& corner : corners(object.box)) {
+    for (const Eigen::Vector2d& corner : floor_corners(object.box)) {
       const cv::Point2d p = canvas.to_pixel(corner.x(), corner.y()) * (1 << kShift);
       polygon.emplace_back(cvRound(p.x), cvRound(p.y));
     }
@@ -205,7 +203,7 @@ cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objec
   const double ground = ground_height(mesh);
   const double lowest = ground + options.lowest_m, highest = ground + options.highest_m;
   Eigen::Vector2d low, high;
-  find_area(mesh, objects, lowest, highest, low, high);
+  find_area(mesh, objects, options.changes, lowest, highest, low, high);
   BirdseyeCanvas canvas(low, high, options.size_px);
   canvas.draw_grid();
   TopView view;
@@ -214,6 +212,7 @@ cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objec
   // Surfaces over outlines: a line that is left is a side of a box that nobody has seen.
   outline(objects, canvas);
   paint(mesh, objects, view, ground, options, canvas);
+  draw_changes(options.changes, canvas);
   label(objects, canvas);
   canvas.decorate(options.title,
                   std::to_string(objects.size()) + (objects.size() == 1 ? " object" : " objects"));

@@ -80,6 +80,8 @@ void BirdseyeCanvas::label(const std::string& words, cv::Point2d center, double 
   text(words, at, size, kInk);
 }
 
+void BirdseyeCanvas::note(const std::string& words, cv::Point at) { text(words, at, 0.36, kInk); }
+
 void BirdseyeCanvas::draw_axes() {
   cv::rectangle(image_, plot_, kInk, 1, cv::LINE_AA);
   const int bottom = plot_.y + plot_.height;

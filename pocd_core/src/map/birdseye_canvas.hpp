@@ -20,6 +20,8 @@ class BirdseyeCanvas {
   /// Faint lines at round distances, below the content.
   void draw_grid();
   void label(const std::string& text, cv::Point2d center, double size);
+  /// Small words, for a legend beside the plot.
+  void note(const std::string& words, cv::Point at);
   /// Frame, ticks, title, scale bar and the legend of the stationarity score.
   void decorate(const std::string& title, const std::string& note);
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,11 @@
 #include "pocd/pipeline/frame_result.hpp"
 
 namespace pocd {
+
+/// Where an object was and where it is: both, it was moved; only one, it is gone or new.
+struct BirdseyeChange {
+  std::optional<OrientedBox> before, after;
+};
 
 struct BirdseyeOptions {
   int size_px = 1000;  ///< longer side of the picture, legend and axes included; at least 400
@@ -19,7 +25,13 @@ struct BirdseyeOptions {
   double lowest_m = -0.5;
   double ground_m = 0.12;
   double highest_m = 2.3;
+  /// Old places are outlined in dashed red, with an arrow to the new one; what is new in blue.
+  std::vector<BirdseyeChange> changes;
 };
+
+/// What the events with stamps from `since_ns` on come to, by object: what was added and removed
+/// again is no change, and several moves are one.
+std::vector<BirdseyeChange> changes_since(const std::vector<ObjectEvent>& events, StampNs since_ns);
 
 /// BGR picture of the map frame's x (right) and y (up). The ground is taken to be the height below
 /// which 2 % of the vertices lie. Surfaces whose owner is one of `objects` have the colour of its
