@@ -25,7 +25,7 @@ quantiles() {
 
 # ROBOTS RATE_HZ LIMIT_MS FOLLOWERS: plays $work/run.mcap to a node, with so many copies of the map beside it.
 measure() {
-  local robots=$1 rate=$2 limit_ms=$3 followers=$4 names=() mirrors=() sent taken in_step=0
+  local robots=$1 rate=$2 limit_ms=$3 followers=$4 names=() mirrors=() sent taken health in_step=0
   for ((i = 1; i <= robots; ++i)); do names+=(--robot "robot$i"); done
   sent=$("$bin/pocd_info" "$work/run.mcap" | awk '/depth\/image_raw/ {for (f = 1; f <= NF; ++f) if ($f ~ /^[0-9]+$/) {n += $f; break}} END {print n}')
   taskset -c 0,1 "$bin/pocd_node" "${bus[@]}" --config "$config" "${names[@]}" \
