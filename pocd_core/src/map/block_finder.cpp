@@ -79,7 +79,7 @@ void BlockFinder::scan(const TsdfConfig& config, const IntegrationInput& input, 
   tile_far_.assign(static_cast<std::size_t>(tiles_x_) * tiles_y_, 0.0f);
   const auto points = static_cast<std::size_t>(points_along_band(config, camera)) + 1;
   cells_.resize(points * kBandBatch * tiles_y_);
-  pool.parallel_for(tiles_y_, 2, [this](std::size_t begin, std::size_t end) {
+  pool.parallel_for(tiles_y_, 1, [this](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) scan_tile_row(static_cast<int>(row));
   });
 }

@@ -248,18 +248,23 @@ PlaneVotes count_votes(const PlaneSegmentation& planes, const OrganizedCloud& cl
   PlaneVotes result;
   result.counts.resize(planes.planes.size());
   result.voters.resize(planes.planes.size());
-  // Neighbours mostly lie on one plane and carry one class.
-  ClassCount* last = nullptr;
-  std::uint16_t last_plane = PlaneSegmentation::kNoPlane;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
+  // Neighbours mostly lie on one plane and carry one class: counted by runs of such.
+  const std::size_t size = cloud.size();
+  for (std::size_t i = 0; i < size;) {
     const std::uint16_t plane = planes.plane_of[i];
-    if (plane == PlaneSegmentation::kNoPlane || !votes(cloud.kind[i])) continue;
-    ++result.voters[plane];
-    if (plane != last_plane || cloud.label[i] != last->label) {
-      last_plane = plane;
-      last = &count_of(result.counts[plane], cloud.label[i], cloud.kind[i]);
+    if (plane == PlaneSegmentation::kNoPlane || !votes(cloud.kind[i])) {
+      ++i;
+      continue;
     }
-    ++last->count;
+    const std::size_t first = i;
+    const ClassId label = cloud.label[i];
+    do {
+      ++i;
+    } while (i < size && planes.plane_of[i] == plane && cloud.label[i] == label &&
+             votes(cloud.kind[i]));
+    const auto run = static_cast<int>(i - first);
+    result.voters[plane] += run;
+    count_of(result.counts[plane], label, cloud.kind[first]).count += run;
   }
   return result;
 }
