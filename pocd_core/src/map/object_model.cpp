@@ -81,6 +81,7 @@ int ObjectModel::fuse(const std::vector<SurfacePoint>& points) {
       continue;
     }
     Surfel& s = surfels_[i];
+    const std::uint64_t old_cell = cell_of(s.point_W);
     const float gain = w / (s.weight + w);
     const Eigen::Vector3f step = p.point_W - s.point_W;
     // Sideways the surfel stays: surfels spread evenly instead of following where pixels are dense.
@@ -89,15 +90,26 @@ int ObjectModel::fuse(const std::vector<SurfacePoint>& points) {
     } else {
       s.point_W += gain * step;
     }
+    refile(i, old_cell);
     if (p.normal_W.squaredNorm() > 0.5f) {
       const Eigen::Vector3f n = s.normal_W + (p.normal_W - s.normal_W) * gain;
       s.normal_W = n.norm() > 1e-3f ? n.normalized() : p.normal_W;
     }
-    s.weight = std::min(s.weight + w, kMaxFrames * w);
+    // A noisy look takes nothing away that precise ones gave.
+    s.weight = std::max(s.weight, std::min(s.weight + w, kMaxFrames * w));
     s.hits = static_cast<std::uint16_t>(std::min<int>(s.hits + 1, 60000));
     s.seen_through = 0;
   }
   return added;
+}
+
+void ObjectModel::refile(std::int32_t i, std::uint64_t old_cell) {
+  const std::uint64_t cell = cell_of(surfels_[i].point_W);
+  if (cell == old_cell) return;
+  // Where another one is at home it stays listed in its old cell.
+  const auto old = index_.find(old_cell);
+  if (old == index_.end() || old->second != i || !index_.try_emplace(cell, i).second) return;
+  index_.erase(old_cell);
 }
 
 void ObjectModel::absorb(const ObjectModel& other) {

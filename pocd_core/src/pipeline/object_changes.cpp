@@ -91,6 +91,15 @@ void ObjectTracker::mark_changed(LibraryObject& object) {
   object.changed = true;
 }
 
+Evidence ObjectTracker::evidence_of(const Step& step, const LibraryObject& object) {
+  const auto it = step.evidence.find(object.id);
+  if (it != step.evidence.end()) return it->second;
+  Evidence evidence;
+  evidence.stationarity_class = object.stationarity_class;
+  evidence.before = evidence.after = object.belief;
+  return evidence;
+}
+
 ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryObject& object,
                                       const std::string& rule) {
   ObjectEvent event;
@@ -102,13 +111,7 @@ ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryO
   event.frame_sequence = step.frame.sequence;
   event.robot = step.frame.robot;
   event.box = object.box;
-  const auto it = step.evidence.find(object.id);
-  if (it != step.evidence.end()) {
-    event.evidence = it->second;
-  } else {
-    event.evidence.stationarity_class = object.stationarity_class;
-    event.evidence.before = event.evidence.after = object.belief;
-  }
+  event.evidence = evidence_of(step, object);
   event.evidence.rule = rule;
   step.result.events.push_back(std::move(event));
   return step.result.events.back();
@@ -190,13 +193,13 @@ void ObjectTracker::remove(Step& step, ObjectId id, const std::string& rule,
     step.result.retired.push_back(id);
     relocations_.remember(record);
   }
+  const Evidence evidence = evidence_of(step, object);
   step.map.clear_object(id);
   for (auto& owner : step.owner_of_observation) {
     if (owner == to_index(id)) owner = IntegrationInput::kSkip;
   }
   library_.erase(id);
   if (!successor) return;
-  const Evidence evidence = step.evidence[id];
   report_move(step, *successor, record, rule);
   step.result.events.back().evidence = evidence;
   step.result.events.back().evidence.rule = rule;
@@ -242,6 +245,7 @@ void ObjectTracker::remove_or_confirm(Step& step) {
 
 void ObjectTracker::report_changes(Step& step) {
   std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
   std::vector<LibraryObject*> touched;
   for (const ObjectId id : changed_) {
     LibraryObject* object = library_.find(id);  // null when removed since

@@ -162,10 +162,25 @@ bool ObjectTracker::revealed_by(const Step& step, const LibraryObject& found,
   return 2 * hidden > found.model.surfels().size();
 }
 
-const OrientedBox& ObjectTracker::known_box(const LibraryObject& object) {
+bool ObjectTracker::is_eaten(const LibraryObject& object) {
   const auto surfels = static_cast<double>(object.model.surfels().size());
-  return static_cast<double>(object.lost) > kEatenShare * surfels ? object.reported_box
-                                                                  : object.box;
+  return static_cast<double>(object.lost) > kEatenShare * surfels;
+}
+
+bool ObjectTracker::reaches_beyond(const Observation& observation, const OrientedBox& box) const {
+  const double margin_m = 2.0 * config_.map.voxel_size_m;
+  const Eigen::AngleAxisd turn(-box.pose.yaw_rad, Eigen::Vector3d::UnitZ());
+  std::size_t beyond = 0;
+  for (const SurfacePoint& p : observation.points) {
+    const Eigen::Vector3d at = turn * (p.point_W.cast<double>() - box.pose.position_W);
+    const Eigen::Vector3d out = at.cwiseAbs() - 0.5 * box.size_m;
+    if (out.head<2>().maxCoeff() > margin_m) ++beyond;
+  }
+  return static_cast<double>(beyond) > kArrivedShare * static_cast<double>(observation.points.size());
+}
+
+const OrientedBox& ObjectTracker::known_box(const LibraryObject& object) {
+  return is_eaten(object) ? object.reported_box : object.box;
 }
 
 bool ObjectTracker::has_arrived(LibraryObject& object) const {
@@ -323,10 +338,11 @@ bool ObjectTracker::slide(Step& step, LibraryObject& object) {
     return false;
   }
   for (Surfel& s : surfels) {
-    if (left_behind(s)) s.seen_through = 255;
+    if (left_behind(s)) s.seen_through = kLeftBehind;
   }
-  object.model.erode(255);
+  object.model.erode(kLeftBehind);
   object.icp_target.reset();
+  step.map.clear_object(object.id);
   object.grew_ns.reset();
   object.reported_box = then;
   refit_box(step, object);

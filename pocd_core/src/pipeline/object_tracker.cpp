@@ -58,13 +58,9 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
 
 void ObjectTracker::find_candidates(Step& step) {
   const double reach = config_.map.max_depth_m;
-  // The frustum lies within a ball around the point half way to its far end.
-  const Eigen::Vector3d axis_W = step.cloud.T_W_C.linear().col(2);
-  const double half_width = step.cloud.width / step.cloud.camera.fx / 2.0;
-  const double radius = reach * std::hypot(0.5, half_width);
-  const Eigen::Vector3d center_W = step.cloud.T_W_C.translation() + 0.5 * reach * axis_W;
+  const ViewBall view = view_ball(step.cloud, reach);
   const SightConfig sight{0.5 * config_.change.tau_m, config_.change.pose_tolerance_m, reach};
-  for (const ObjectId id : library_.near(center_W, radius)) {
+  for (const ObjectId id : library_.near(view.center_W, view.radius_m)) {
     LibraryObject& object = *library_.find(id);
     if (candidates_.size() <= step.candidate_count) candidates_.emplace_back();
     Candidate& candidate = candidates_[step.candidate_count];
@@ -89,12 +85,16 @@ void ObjectTracker::note_presence(Step& step) {
       if (step.observations.list[touch.observation].class_id == object.class_id)
         covered += touch.in_front;
     }
-    // Points where masks show another class do not show this object.
-    const int own = s.hit - s.hit_other_class;
-    if (!step.association.doubtful[c] && own >= kPresentPoints && own >= kPresentShare * in_view) {
+    // Points where masks show another class do not show this object; without masks nothing does.
+    const int other = step.frame.labels.empty() ? 0 : s.hit_other_class;
+    const int own = s.hit - other;
+    // Nor does what free space left of it.
+    const double eaten = is_eaten(object) ? static_cast<double>(object.lost) : 0.0;
+    if (!step.association.doubtful[c] && own >= kPresentPoints &&
+        own >= kPresentShare * (in_view + eaten)) {
       object.verified_ns = step.frame.stamp_ns;
     } else if (step.association.doubtful[c] ||
-               s.seen_through + covered + s.hit_other_class > kContestedShare * in_view) {
+               s.seen_through + covered + other > kContestedShare * in_view) {
       if (object.contested_since_ns <= object.verified_ns)
         object.contested_since_ns = step.frame.stamp_ns;
       object.contested_ns = step.frame.stamp_ns;
@@ -109,7 +109,13 @@ void ObjectTracker::update_matched(Step& step) {
     const Sighting& sighting = candidates_[match.candidate].sighting;
     const Observation& observation = step.observations.list[match.observation];
     object.frames_seen_through = 0;
-    if (moment_of(step, object).robots.size() == 1) ++object.frames_in_view;
+    // What free space eats away does not grow on the other side: that may be where it went.
+    if (match.stationary && object.confirmed && is_eaten(object) &&
+        reaches_beyond(observation, object.reported_box)) {
+      step.moved_from[match.observation] = object.id;
+      step.association.unassigned.push_back(match.observation);
+      continue;
+    }
     if (config_.association.realign_displaced && object.confirmed &&
         shift_object(step, object, match, sighting)) {
       continue;
@@ -182,6 +188,7 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   object.frames_displaced = 0;
   const OrientedBox previous_box = object.box;
   object.model.transform(moved->T_new_old);
+  candidates_[match.candidate].sighting.sights.clear();  // of points that are elsewhere now
   object.icp_target.reset();
   step.map.clear_object(object.id);
   refit_box(step, object);
@@ -252,7 +259,12 @@ void ObjectTracker::update_unmatched(Step& step) {
     LibraryObject& object = *candidates_[c].object;
     const Sighting& sighting = candidates_[c].sighting;
     const bool aware = config_.association.occlusion_aware;
-    const double share = aware ? sighting.visible_share() : sighting.in_view_share();
+    double share = aware ? sighting.visible_share() : sighting.in_view_share();
+    if (aware && is_eaten(object)) {
+      // Points that were dropped because they were seen through were seen, too.
+      const auto lost = static_cast<double>(object.lost);
+      share = (sighting.visible() + lost) / (sighting.total + lost);
+    }
     if (share < config_.association.min_visible_share) continue;
     Moment& moment = moment_of(step, object);
     if (!object.confirmed && moment.robots.size() == 1) ++object.frames_in_view;
@@ -270,10 +282,11 @@ void ObjectTracker::erode(Step& step) {
     auto& surfels = object.model.surfels();
     // Fusion appends; the first ones are still those that were looked at.
     for (std::size_t i = 0; i < sights.size(); ++i) {
-      if (sights[i] == Sight::kSeenThrough && surfels[i].seen_through < 255)
+      if (sights[i] == Sight::kSeenThrough && surfels[i].seen_through + 1 < kLeftBehind)
         ++surfels[i].seen_through;
       if (sights[i] == Sight::kHit) surfels[i].seen_through = 0;
     }
+    if (config_.state.erode_frames == 0) continue;
     if (const int lost = object.model.erode(config_.state.erode_frames); lost > 0) {
       object.icp_target.reset();
       object.lost += static_cast<std::size_t>(lost);
@@ -357,7 +370,6 @@ void ObjectTracker::add_new(Step& step) {
     // stays.
     object.moment.measured = true;
     object.moment.points = std::numeric_limits<int>::max();
-    object.frames_in_view = 1;
     step.owner_of_observation[index] = to_index(object.id);
   }
 }

@@ -111,6 +111,10 @@ class ObjectTracker {
   /// Makes `found` the continuation of a removed object, and reports it as MOVED.
   void report_move(Step& step, LibraryObject& found, const RelocationMemory::Removed& origin,
                    const std::string& rule);
+  /// Free space took a notable share of its points since the last report.
+  static bool is_eaten(const LibraryObject& object);
+  /// A good part of what is observed lies outside of a box.
+  bool reaches_beyond(const Observation& observation, const OrientedBox& box) const;
   /// The box of an object when all of it was there: that of its last report while free space eats
   /// it away, else the present one.
   static const OrientedBox& known_box(const LibraryObject& object);
@@ -127,6 +131,8 @@ class ObjectTracker {
   /// Takes the object out of library and map. It is reported as MOVED when there is a successor:
   /// the given one, or what new_place_of finds.
   void remove(Step& step, ObjectId id, const std::string& rule, LibraryObject* successor = nullptr);
+  /// What was measured of an object in this frame; else its belief as it is.
+  static Evidence evidence_of(const Step& step, const LibraryObject& object);
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
                          const std::string& rule);
   double like_size_slack_m() const { return 3.0 * config_.map.voxel_size_m; }

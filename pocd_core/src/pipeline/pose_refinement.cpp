@@ -90,9 +90,8 @@ std::optional<Pose> refine_pose(const OrganizedCloud& cloud, const ObjectLibrary
                                 double max_depth_m, const DepthNoise& noise,
                                 const PoseRefinementConfig& config) {
   const Eigen::Vector3d eye_W = cloud.T_W_C.translation();
-  const Eigen::Vector3d center_W = eye_W + 0.5 * max_depth_m * cloud.T_W_C.linear().col(2);
-  const double half_width = cloud.width / cloud.camera.fx / 2.0;
-  const auto ids = library.near(center_W, max_depth_m * std::hypot(0.5, half_width));
+  const ViewBall view = view_ball(cloud, max_depth_m);
+  const auto ids = library.near(view.center_W, view.radius_m);
   const double heading_rad = config.sigma_heading_deg * M_PI / 180.0;
   const Vector4d sigma(config.sigma_position_m, config.sigma_position_m,
                        config.sigma_position_m / 3.0, heading_rad);

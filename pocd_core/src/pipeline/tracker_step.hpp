@@ -8,6 +8,9 @@
 
 namespace pocd {
 
+/// Count of a surfel that is known to be gone; one that is only seen through stays below.
+constexpr std::uint8_t kLeftBehind = 255;
+
 struct ObjectTracker::Step {
   const Frame& frame;
   const OrganizedCloud& cloud;

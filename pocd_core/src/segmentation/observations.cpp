@@ -316,10 +316,7 @@ void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const De
   std::uint64_t last_key = 0;
   std::int32_t last = CellIndex::kNone;
   PixelGrid grid(cloud.width, memory.column_steps);
-  for (const std::int32_t i : cluster.members) {
-    const float z = cloud.depth_m[i];
-    const int step = std::max(1, static_cast<int>(pixels_per_spacing / z / 4.0));
-    if (!grid.has(i, step)) continue;
+  const auto take = [&](std::int32_t i) {
     const Eigen::Vector3f p = cloud.point_W(i);
     const std::uint64_t key = cell_key(p, inverse);
     if (last == CellIndex::kNone || key != last_key) {
@@ -332,9 +329,15 @@ void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const De
     sum.point += p;
     const std::uint16_t plane = planes.plane_of[i];
     if (plane != PlaneSegmentation::kNoPlane) sum.normal += planes.planes[plane].normal_W;
-    sum.sigma += static_cast<float>(noise.sigma(z));
+    sum.sigma += static_cast<float>(noise.sigma(cloud.depth_m[i]));
     ++sum.count;
+  };
+  for (const std::int32_t i : cluster.members) {
+    const int step = std::max(1, static_cast<int>(pixels_per_spacing / cloud.depth_m[i] / 4.0));
+    if (grid.has(i, step)) take(i);
   }
+  // A mask of stripes may have no pixel on that grid.
+  if (sums.empty()) std::for_each(cluster.members.begin(), cluster.members.end(), take);
   points.clear();
   points.reserve(sums.size());
   for (const Memory::CellSum& sum : sums) {

@@ -109,4 +109,14 @@ void organize(const Frame& frame, int stride, double max_depth_m, const ClassMap
   });
 }
 
+ViewBall view_ball(const OrganizedCloud& cloud, double max_depth_m) {
+  const CameraModel& camera = cloud.camera;
+  const double half_width = std::max(camera.cx, cloud.width - camera.cx) / camera.fx;
+  const double half_height = std::max(camera.cy, cloud.height - camera.cy) / camera.fy;
+  // The frustum lies within a ball around the point half way to its far end.
+  const Eigen::Vector3d half_way = 0.5 * max_depth_m * cloud.T_W_C.linear().col(2);
+  return {cloud.T_W_C.translation() + half_way,
+          max_depth_m * std::hypot(0.5, std::hypot(half_width, half_height))};
+}
+
 }  // namespace pocd

@@ -1,9 +1,12 @@
 #include "pocd/segmentation/planes.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <unordered_map>
 
 #include "pocd/common/kernel.hpp"
 
@@ -221,6 +224,8 @@ struct ClassCount {
 struct PlaneVotes {
   std::vector<std::vector<ClassCount>> counts;
   std::vector<int> voters;
+  /// Of a plane << 16 | class: index in counts, beyond the first few.
+  std::unordered_map<std::uint32_t, std::size_t> place_of;
 
   const ClassCount* winner(std::size_t plane) const {
     const ClassCount* best = nullptr;
@@ -236,9 +241,18 @@ bool votes(PixelKind kind) {
   return kind == PixelKind::kGround || kind == PixelKind::kBackground || kind == PixelKind::kObject;
 }
 
-ClassCount& count_of(std::vector<ClassCount>& counts, ClassId label, PixelKind kind) {
-  for (ClassCount& c : counts) {
-    if (c.label == label) return c;
+/// Counts of one plane; few classes are found by looking through them, a mask of noise by a table.
+ClassCount& count_of(PlaneVotes& votes, std::uint16_t plane, ClassId label, PixelKind kind) {
+  constexpr std::size_t kFew = 16;
+  std::vector<ClassCount>& counts = votes.counts[plane];
+  const std::size_t few = std::min(kFew, counts.size());
+  for (std::size_t k = 0; k < few; ++k) {
+    if (counts[k].label == label) return counts[k];
+  }
+  if (few == kFew) {
+    const auto key = static_cast<std::uint32_t>(plane) << 16 | label;
+    const auto [it, fresh] = votes.place_of.try_emplace(key, counts.size());
+    if (!fresh) return counts[it->second];
   }
   counts.push_back({label, kind, 0});
   return counts.back();
@@ -264,9 +278,29 @@ PlaneVotes count_votes(const PlaneSegmentation& planes, const OrganizedCloud& cl
              votes(cloud.kind[i]));
     const auto run = static_cast<int>(i - first);
     result.voters[plane] += run;
-    count_of(result.counts[plane], label, cloud.kind[first]).count += run;
+    count_of(result, plane, label, cloud.kind[first]).count += run;
   }
   return result;
+}
+
+/// Height of the pixels of a ground class where nearly all agree within `band_m` [m, W]: a strip at
+/// the image's edge is too little for a plane, but a thing's ragged foot is not to be joined over it
+/// with the next one's.
+std::optional<float> ground_class_level(const OrganizedCloud& cloud, float band_m) {
+  constexpr std::size_t kPixels = 50;
+  constexpr double kShare = 0.9;
+  std::vector<float> z;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.kind[i] == PixelKind::kGround) z.push_back(cloud.z_W[i]);
+  }
+  if (z.size() < kPixels) return std::nullopt;
+  const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
+  std::nth_element(z.begin(), middle, z.end());
+  const float level = *middle;
+  const auto near = std::count_if(z.begin(), z.end(),
+                                  [&](float v) { return std::abs(v - level) <= band_m; });
+  if (static_cast<double>(near) < kShare * static_cast<double>(z.size())) return std::nullopt;
+  return level;
 }
 
 }  // namespace
@@ -288,6 +322,7 @@ void vote_planes(const PlaneSegmentation& planes, double majority_share, Organiz
 
 void GroundModel::update(const PlaneSegmentation& planes, const SegmentationConfig& config,
                          const DepthNoise& noise, OrganizedCloud& cloud) {
+  constexpr int kStrip = 4;  // times the least pixels: a smaller plane is a strip
   const PlaneVotes tally = count_votes(planes, cloud);
   const float min_up = static_cast<float>(std::cos(config.ground_max_tilt_deg * M_PI / 180.0));
   const int min_pixels =
@@ -320,6 +355,20 @@ void GroundModel::update(const PlaneSegmentation& planes, const SegmentationConf
     from_class_ = best_class;
     normal_W_ = best->normal_W;
     offset_m_ = best->offset_m;
+    level_m_ = height_at(x, y);
+    is_strip_ = best->pixels < kStrip * min_pixels;
+  } else if (is_strip_) {
+    // The tilt of a strip at the image's edge says nothing of the floor elsewhere.
+    normal_W_ = Eigen::Vector3f::UnitZ();
+    offset_m_ = level_m_;
+  }
+  if (!known_) {
+    if (const auto level = ground_class_level(cloud, 2.0f * static_cast<float>(config.ground_band_m))) {
+      known_ = from_class_ = true;
+      normal_W_ = Eigen::Vector3f::UnitZ();
+      offset_m_ = level_m_ = *level;
+      is_strip_ = true;
+    }
   }
   const float band = static_cast<float>(config.ground_band_m);
   const float ceiling = static_cast<float>(config.max_height_m);

@@ -18,7 +18,8 @@ namespace {
 Belief step(const Evidence& e, const StateConfig& state, const ChangeConfig& change) {
   const Measurement z{e.delta_m, e.stationarity_class, e.measurement_sigma_m, e.k};
   Belief after = bayesian_update(e.before, z, change.delta_max_m).belief;
-  if (after.alpha / (after.alpha + after.beta) > state.max_stationarity) return e.before;
+  const auto share = [](const Belief& b) { return b.alpha / (b.alpha + b.beta); };
+  if (share(after) > std::max(state.max_stationarity, share(e.before))) return e.before;
   const double scale = std::min(1.0, state.max_count / (after.alpha + after.beta));
   after.alpha *= scale;
   after.beta *= scale;

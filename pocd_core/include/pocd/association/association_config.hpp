@@ -28,7 +28,7 @@ struct AssociationConfig {
         "boxes overlap, theta_dist [m].");
     visit("max_dissimilarity", max_dissimilarity, Range{0.0, 1.0},
           "Largest share of outliers after ICP, theta_sim.");
-    visit("cutoff_cost", cutoff_cost, Range{0.0, 1e6},
+    visit("cutoff_cost", cutoff_cost, Range{1e-6, 1e6},
           "Pairs that cost more are no pair, theta_cutoff.");
     visit("lambda_translation", lambda_translation, Range{0.0, 1e6},
           "Cost per metre of translation [1/m].");

@@ -48,7 +48,7 @@ struct LibraryObject {
   std::set<std::string> seen_by;  ///< robots that have observed it
   Moment moment;                  ///< the last one
   std::uint32_t observations = 0;
-  int frames_in_view = 0;           ///< tentative only
+  int frames_in_view = 0;           ///< tentative only: without being matched
   int frames_seen_through = 0;      ///< in a row
   int frames_displaced = 0;         ///< in a row
   int frames_odd = 0;               ///< in a row, much of it beside its surface, aligned in place

@@ -49,6 +49,8 @@ class ObjectModel {
  private:
   std::uint64_t cell_of(const Eigen::Vector3f& p) const;
   void rebuild_index();
+  /// Lists a surfel that crept out of its cell in the one where it is now.
+  void refile(std::int32_t i, std::uint64_t old_cell);
 
   double spacing_m_;
   float inverse_spacing_;

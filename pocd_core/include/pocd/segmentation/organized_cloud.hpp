@@ -32,6 +32,13 @@ struct OrganizedCloud {
   Eigen::Vector3f point_W(std::size_t i) const { return {x_W[i], y_W[i], z_W[i]}; }
 };
 
+/// A ball around all that the camera sees up to a depth [m, W].
+struct ViewBall {
+  Eigen::Vector3d center_W;
+  double radius_m = 0.0;
+};
+ViewBall view_ball(const OrganizedCloud& cloud, double max_depth_m);
+
 /// ClassMap as a table for pixel loops. Two classes with one name are one class: the one listed
 /// first (masks of one kind of thing may alias between two indices).
 class ClassTable {

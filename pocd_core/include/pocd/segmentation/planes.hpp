@@ -42,7 +42,9 @@ void vote_planes(const PlaneSegmentation& planes, double majority_share, Organiz
 class GroundModel {
  public:
   /// Looks for the ground among the planes that face up: those whose pixels are mostly of a ground
-  /// class if there are any, else the lowest that is large enough. Then marks as kGround every
+  /// class if there are any, else the lowest that is large enough; until there is one, at the level
+  /// of the pixels of a ground class, if they agree. A narrow strip holds its tilt for its own frame
+  /// only. Then marks as kGround every
   /// pixel in the band above the plane, and below it; a pixel of a ground class elsewhere becomes
   /// background, one above `max_height_m` too.
   void update(const PlaneSegmentation& planes, const SegmentationConfig& config,
@@ -59,6 +61,8 @@ class GroundModel {
   bool from_class_ = false;
   Eigen::Vector3f normal_W_ = Eigen::Vector3f::UnitZ();
   float offset_m_ = 0.0f;
+  float level_m_ = 0.0f;  ///< where the plane was seen [m, W]
+  bool is_strip_ = false;
 };
 
 }  // namespace pocd

@@ -46,11 +46,11 @@ struct StateConfig {
     visit("confirm_observations", confirm_observations, Range{1, 1000},
           "Observations before a new object is reported as ADDED.");
     visit("tentative_frames", tentative_frames, Range{1, 100000},
-          "A new object that is in view this many frames without being confirmed is forgotten "
+          "A new object that is in view this many frames without being seen is forgotten "
           "[frames].");
-    visit("erode_frames", erode_frames, Range{1, 1000},
+    visit("erode_frames", erode_frames, Range{0, 250},
           "A point of an object that is seen through in this many frames in a row is dropped "
-          "[frames].");
+          "[frames]; 0: never.");
     visit("wait_for_doubt_frames", wait_for_doubt_frames, Range{0, 100000},
           "How much longer the report of a new object waits while a like one is seen through: both "
           "are "
