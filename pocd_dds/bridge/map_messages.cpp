@@ -27,7 +27,7 @@ pocd_msgs::msg::TileData data_of(const MapTile& tile) {
   data.key(key_of(tile.key));
   data.version(tile.version);
   data.crc(crc_of(tile.payload));
-  data.payload(tile.payload);
+  data.payload(tile.payload.bytes());
   return data;
 }
 
@@ -62,7 +62,7 @@ pocd_msgs::msg::MapTile tile_message(const MapTile& tile, std::uint32_t map_id,
   message.epoch(epoch);
   message.version(tile.version);
   message.crc(crc_of(tile.payload));
-  message.payload(tile.payload);
+  message.payload(tile.payload.bytes());
   return message;
 }
 

@@ -22,7 +22,7 @@ inline MapTile random_tile(Random& random, std::uint64_t version) {
 
 /// As if it had been damaged on the way.
 inline void lengthen(MapTile& tile) {
-  std::vector<std::uint8_t> payload = tile.payload;
+  std::vector<std::uint8_t> payload = tile.payload.bytes();
   payload.push_back(1);
   tile.payload = std::move(payload);
 }
@@ -32,7 +32,7 @@ using Contents = std::map<TileKey, std::vector<std::uint8_t>>;
 template <class Tiles>
 Contents contents(const Tiles& tiles) {
   Contents out;
-  for (const auto& [key, tile] : tiles) out[key] = tile.payload;
+  for (const auto& [key, tile] : tiles) out[key] = tile.payload.bytes();
   return out;
 }
 

@@ -72,7 +72,7 @@ TEST(MapReplica, DamagedContentIsNoticed) {
   const History h(random, 1, 4);
   MapReplica replica;
   MapDelta damaged = h.deltas[0];
-  std::vector<std::uint8_t> payload = damaged.changed[0].payload;
+  std::vector<std::uint8_t> payload = damaged.changed[0].payload.bytes();
   payload[0] = static_cast<std::uint8_t>(payload[0] ^ 1);
   damaged.changed[0].payload = payload;
   EXPECT_EQ(replica.apply(damaged), DeltaOutcome::kCorrupt);
