@@ -18,13 +18,17 @@ namespace pocd::dds {
 
 inline std::atomic<bool> stop_requested{false};
 
-/// The first SIGINT or SIGTERM asks for an orderly end, a second one ends the process as usual.
+/// The first SIGINT, SIGTERM or SIGHUP (its terminal was closed) asks for an orderly end, a second
+/// one ends the process as usual. Who started it with nohup goes on.
 inline void stop_on_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = true; };
   action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction hangup {};
+  sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
 }
 
 /// Messages go to stderr; stdout belongs to results.

@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
       "Maps what the robots' cameras see and publishes what changes.\n"
       "Example: pocd_node --config config/simulated.yaml --robot robot_1 --robot robot_2\n"
       "Without a named robot, it listens to every robot that appears on the bus.\n"
-      "Runs until SIGINT or SIGTERM, then publishes its last state.\n"
+      "Runs until SIGINT, SIGTERM or SIGHUP, then publishes its last state.\n"
       "Exit code: 0 ended in order, 1 the bus failed or subscribers did not acknowledge the last "
       "state, 2 usage or configuration.",
       "pocd_node");
@@ -121,7 +121,7 @@ int main(int argc, char** argv) {
     const bool good = node.run(pocd::dds::stop_requested);
     const pocd::dds::WorkStatus work = node.work_status();
     spdlog::info("ended: {} frames processed, {} refused, {} objects, map version {}",
-                 work.processed, work.refused, work.objects, work.map_version);
+                 work.processed, work.refused, work.objects, work.map.version);
     const double frames = static_cast<double>(std::max<std::uint64_t>(1, work.processed));
     spdlog::info(
         "CPU per frame [ms]: pipeline {:.2f}, publishing {:.2f}, taking images {:.2f}, the rest of "

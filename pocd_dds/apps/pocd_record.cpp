@@ -47,7 +47,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Records topics of the bus into an MCAP file, whatever their types.\n"
       "Example: pocd_record --output run.mcap --topic '/robot_*' --topic '/tf*'\n"
-      "Runs until SIGINT or SIGTERM. Killed, it leaves a file that can be read up to the last "
+      "Runs until SIGINT, SIGTERM or SIGHUP. Killed, it leaves a file that can be read up to the "
+      "last "
       "second.\n"
       "Exit code: 0 recorded without loss, 1 samples were dropped or the file could not be "
       "written, "

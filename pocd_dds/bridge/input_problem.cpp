@@ -15,6 +15,14 @@ void ProblemCounter::count(const std::string& topic, const InputProblem& problem
   seen.count += times;
 }
 
+void ProblemCounter::count_incompatible(RawReader& reader) {
+  const std::uint64_t times = reader.take_incompatible();
+  if (times == 0) return;
+  Seen& seen = seen_[{reader.topic(), InputReason::kIncompatibleQos}];
+  seen.detail = "a writer does not offer the quality of service that is asked for";
+  seen.count += times;
+}
+
 std::vector<ProblemCounter::Entry> ProblemCounter::entries() const {
   std::vector<Entry> entries;
   for (const auto& [key, seen] : seen_) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pocd/input/input_problem.hpp"
+#include "pocd_dds/entities/reader.hpp"
 
 namespace pocd::dds {
 
@@ -14,6 +15,9 @@ namespace pocd::dds {
 class ProblemCounter {
  public:
   void count(const std::string& topic, const InputProblem& problem, std::uint64_t times = 1);
+
+  /// Writers that the reader cannot hear; it has logged that itself.
+  void count_incompatible(RawReader& reader);
 
   struct Entry {
     std::string topic;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/geometry_messages.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -14,27 +14,12 @@ constexpr std::int32_t kCube = 1, kAdd = 0, kDelete = 2,
 constexpr std::int32_t kObstacleAdd = 1, kObstacleDelete = 2;   // rmf_obstacle_msgs/Obstacle
 constexpr std::uint8_t kUint16 = 4, kUint32 = 6, kFloat32 = 7;  // sensor_msgs/PointField
 
-std_msgs::msg::Header header_of(StampNs stamp_ns, const std::string& frame_id) {
-  std_msgs::msg::Header header;
-  header.stamp(to_time(stamp_ns));
-  header.frame_id(frame_id);
-  return header;
-}
-
 geometry_msgs::msg::Pose pose_of(const OrientedBox& box) {
   geometry_msgs::msg::Pose pose;
-  pose.position().x(box.pose.position_W.x());
-  pose.position().y(box.pose.position_W.y());
-  pose.position().z(box.pose.position_W.z());
+  pose.position(point_of(box.pose.position_W));
   pose.orientation().z(std::sin(box.pose.yaw_rad / 2));
   pose.orientation().w(std::cos(box.pose.yaw_rad / 2));
   return pose;
-}
-
-geometry_msgs::msg::Vector3 size_of(const OrientedBox& box) {
-  geometry_msgs::msg::Vector3 size;
-  size.x(box.size_m.x()), size.y(box.size_m.y()), size.z(box.size_m.z());
-  return size;
 }
 
 std::int32_t number_of(ObjectId id) { return static_cast<std::int32_t>(to_index(id)); }
@@ -77,7 +62,7 @@ visualization_msgs::msg::MarkerArray marker_array(const ObjectsById& objects,
     visualization_msgs::msg::Marker& marker = push(kAdd, number_of(id));
     marker.type(kCube);
     marker.pose(pose_of(object.box));
-    marker.scale(size_of(object.box));
+    marker.scale(vector_of(object.box.size_m));
     const auto stationarity = static_cast<float>(object.belief.stationarity());
     marker.color().r(1.0f - stationarity);
     marker.color().g(stationarity);
@@ -113,7 +98,7 @@ rmf_obstacle_msgs::msg::Obstacles obstacles_message(const ObjectsById& objects,
     rmf_obstacle_msgs::msg::Obstacle& obstacle = push(id, kObstacleAdd);
     obstacle.classification(classes.name(object.class_id));
     obstacle.bbox().center(pose_of(object.box));
-    obstacle.bbox().size(size_of(object.box));
+    obstacle.bbox().size(vector_of(object.box.size_m));
   }
   return message;
 }

@@ -13,7 +13,14 @@ TileKey neighbour(TileKey key, int axis, int by) {
   return key;
 }
 
-/// Tiles decoded once each, however many neighbours ask for them.
+struct ByX {
+  bool operator()(const TileKey& a, const TileKey& b) const {
+    return a.x != b.x ? a.x < b.x : a < b;
+  }
+};
+
+/// Tiles decoded once each, however many neighbours ask for them. Decoded ones are large: they are
+/// held no longer than for two neighbouring values of x.
 class Decoder {
  public:
   Decoder(const std::map<TileKey, MapTile>& tiles, double truncation_m)
@@ -30,10 +37,15 @@ class Decoder {
     return entry->second.get();
   }
 
+  /// Nobody will ask for tiles of a smaller x any more.
+  void forget_before(std::int32_t x) {
+    while (!decoded_.empty() && decoded_.begin()->first.x < x) decoded_.erase(decoded_.begin());
+  }
+
  private:
   const std::map<TileKey, MapTile>& tiles_;
   const double truncation_m_;
-  std::map<TileKey, std::unique_ptr<DecodedTile>> decoded_;
+  std::map<TileKey, std::unique_ptr<DecodedTile>, ByX> decoded_;
 };
 
 std::vector<SurfacePoint> points_of(const TileKey& key, Decoder& decoded, double voxel_m) {
@@ -71,7 +83,7 @@ std::vector<SurfacePoint> points_of(const TileKey& key, Decoder& decoded, double
 void SurfacePoints::apply(const std::map<TileKey, MapTile>& tiles,
                           const std::vector<TileKey>& changed,
                           const std::vector<TileKey>& removed) {
-  std::set<TileKey> affected;
+  std::set<TileKey, ByX> affected;
   for (const auto* keys : {&changed, &removed}) {
     for (const TileKey& key : *keys) {
       affected.insert(key);
@@ -80,10 +92,12 @@ void SurfacePoints::apply(const std::map<TileKey, MapTile>& tiles,
   }
   Decoder decoded(tiles, truncation_m_);
   for (const TileKey& key : affected) {
+    decoded.forget_before(key.x);
     std::vector<SurfacePoint> points = points_of(key, decoded, voxel_size_m_);
     if (points.empty()) {
       points_.erase(key);
     } else {
+      points.shrink_to_fit();
       points_[key] = std::move(points);
     }
   }

@@ -132,9 +132,12 @@ Findings check_topics(const BusPicture& bus, const NodeConfig& node) {
   for (const std::string& topic : transforms) {
     check_writers(bus.endpoints(topic, true), topic, topics::kTfStatic, true, findings);
   }
-  if (bus.endpoints(topics::kObjects.name, true).size() > 1) {
-    findings.push_back({Severity::kWarning, topics::kObjects.name, "several nodes publish a map",
-                        "subscribers see both; keep one node per domain"});
+  const std::size_t nodes = bus.endpoints(topics::kObjects.name, true).size();
+  if (nodes > 1) {
+    findings.push_back({Severity::kNote, topics::kObjects.name,
+                        std::to_string(nodes) + " nodes publish objects",
+                        "each needs a node.map_id of its own; those that have not say so in "
+                        "pocd/health (second_publisher)"});
   }
   return findings;
 }

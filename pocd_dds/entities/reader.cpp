@@ -12,6 +12,7 @@
 #include <set>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/entities/policy_name.hpp"
 
 namespace pocd::dds {
 
@@ -24,7 +25,7 @@ struct RawReader::Impl : DataReaderListener {
   Wakeup* wakeup = nullptr;
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
-  std::atomic<std::uint64_t> incompatible{0}, lost{0};
+  std::atomic<std::uint64_t> incompatible{0}, told{0}, lost{0};
   std::mutex mutex;
   std::set<SampleMeta::Guid> writers;
 
@@ -51,8 +52,8 @@ struct RawReader::Impl : DataReaderListener {
   void on_requested_incompatible_qos(DataReader*,
                                      const RequestedIncompatibleQosStatus& status) override {
     if (incompatible.fetch_add(1) == 0) {
-      spdlog::warn("{}: a writer does not offer the quality of service asked for (policy {})",
-                   topic, static_cast<int>(status.last_policy_id));
+      spdlog::warn("{}: a writer does not offer the {} that is asked for: it is not heard", topic,
+                   policy_name(static_cast<std::int32_t>(status.last_policy_id)));
     }
   }
 };
@@ -82,6 +83,10 @@ bool RawReader::has_writer(const SampleMeta::Guid& writer) const {
   return impl_->writers.count(writer) > 0;
 }
 std::uint64_t RawReader::incompatible() const { return impl_->incompatible; }
+std::uint64_t RawReader::take_incompatible() {
+  const std::uint64_t count = impl_->incompatible;
+  return count - impl_->told.exchange(count);
+}
 std::uint64_t RawReader::lost() const { return impl_->lost; }
 
 bool RawReader::take_raw(void* sample, SampleMeta& meta) {

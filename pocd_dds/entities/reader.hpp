@@ -42,7 +42,10 @@ class RawReader {
   int ever_matched() const;
   /// The writer with this GUID is matched now.
   bool has_writer(const SampleMeta::Guid& writer) const;
+  /// Writers whose quality of service does not fit, each time they are found.
   std::uint64_t incompatible() const;
+  /// Those since the last call.
+  std::uint64_t take_incompatible();
   /// Samples that the bus says were lost on the way.
   std::uint64_t lost() const;
 

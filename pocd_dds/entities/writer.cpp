@@ -7,6 +7,7 @@
 #include <fastdds/dds/publisher/Publisher.hpp>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/entities/policy_name.hpp"
 
 namespace pocd::dds {
 
@@ -27,8 +28,8 @@ struct RawWriter::Impl : DataWriterListener {
   void on_offered_incompatible_qos(DataWriter*,
                                    const OfferedIncompatibleQosStatus& status) override {
     if (incompatible.fetch_add(1) == 0) {
-      spdlog::warn("{}: a reader asks for a quality of service that is not offered (policy {})",
-                   topic, static_cast<int>(status.last_policy_id));
+      spdlog::warn("{}: a reader asks for {} that is not offered: it gets nothing", topic,
+                   policy_name(static_cast<std::int32_t>(status.last_policy_id)));
     }
   }
 };

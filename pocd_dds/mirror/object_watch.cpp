@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "mirror/shared_participant.hpp"
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_msgsPubSubTypes.h"
 

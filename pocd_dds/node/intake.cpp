@@ -31,7 +31,8 @@ Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig
       queue_(queue),
       latency_(latency),
       colours_(classes),
-      roster_(node, problems_),
+      topics_(node),
+      roster_(node),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
       tf_(node.topics.own_tf() ? nullptr
                                : std::make_unique<TransformInput>(participant, node.topics.tf,
@@ -72,8 +73,21 @@ void Intake::meet(const std::string& name, const RobotConfig& config, bool named
 
 void Intake::follow_roster() {
   const auto now = Roster::Clock::now();
-  for (const BusEvent& event : watch_.take()) follow(roster_.hear(event, now));
+  for (const BusEvent& event : watch_.take()) {
+    check_type(event);
+    follow(roster_.hear(event, now));
+  }
   follow(roster_.settle(now));
+}
+
+// Fast DDS keeps quiet about it: a writer of another type just never matches.
+void Intake::check_type(const BusEvent& event) {
+  if (event.kind != BusEvent::Kind::kEndpoint || !event.endpoint.writer) return;
+  const TopicSpec* expected = topics_.spec_of(event.endpoint.topic);
+  if (expected == nullptr || event.endpoint.type == expected->type) return;
+  problems_.count(event.endpoint.topic,
+                  {InputReason::kWrongType,
+                   "announced with type " + event.endpoint.type + ", expected " + expected->type});
 }
 
 void Intake::follow(const std::vector<RosterChange>& changes) {

@@ -14,6 +14,7 @@
 #include "pocd/input/frame_merger.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/frame_queue.hpp"
+#include "pocd_dds/node/input_topics.hpp"
 #include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/robot_input.hpp"
 #include "pocd_dds/node/roster.hpp"
@@ -68,6 +69,7 @@ class Intake {
   void run();
   void step(bool last);
   void follow_roster();
+  void check_type(const BusEvent& event);
   void follow(const std::vector<RosterChange>& changes);
   void meet(const std::string& name, const RobotConfig& config, bool named);
   /// True when nothing of the robot is left here and it is to be erased.
@@ -83,6 +85,7 @@ class Intake {
   Wakeup wakeup_;
   ColourTable colours_;
   ProblemCounter problems_;
+  const InputTopics topics_;
   Roster roster_;
   TransformTree transforms_;            ///< of the topics that all robots share
   std::unique_ptr<TransformInput> tf_;  ///< null when every robot has its own

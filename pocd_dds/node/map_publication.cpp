@@ -1,8 +1,8 @@
 #include "pocd_dds/node/map_publication.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <thread>
+#include <utility>
 
 namespace pocd::dds {
 namespace {
@@ -32,35 +32,43 @@ MapPublication::MapPublication(const std::shared_ptr<Participant>& participant,
                                const NodeFile& config, std::uint64_t epoch, Wakeup& wakeup)
     : config_(config),
       map_id_(static_cast<std::uint32_t>(config.node.map_id)),
-      publisher_(epoch, config.pipeline.map),
+      wakeup_(wakeup),
       tiles_(participant, topics::kMapTiles),
       deltas_(participant, topics::kMapDeltas),
       manifest_(participant, topics::kMapManifest),
       replies_(participant, topics::kSnapshotReply),
       requests_(participant, topics::kSnapshotRequest, wakeup),
+      publisher_(epoch, config.pipeline.map),
       budget_(1e6 * config.node.map_rate_mb_s) {}
 
-bool MapPublication::send_due(TsdfMap& map, StampNs stamp_ns, bool now) {
-  send_waiting();
+bool MapPublication::begin_step(bool now) {
   const auto time = std::chrono::steady_clock::now();
-  // When the network does not keep up, steps become fewer and larger instead of a queue that grows.
-  const bool due =
-      std::chrono::duration<double>(time - last_sent_).count() >= config_.node.map_period_s &&
-      deltas_waiting_.empty() && tiles_waiting_.empty();
-  if (!now && !due) return false;
-  last_sent_ = time;
-  std::optional<MapDelta> delta = publisher_.update(map);
-  if (!delta) return true;
-  stamp_ns_ = stamp_ns;
-  for (auto& message : delta_messages(*delta, map_id_, stamp_ns, kPartBytes)) {
-    deltas_waiting_.push_back(std::move(message));
+  if (!now) {
+    if (std::chrono::duration<double>(time - last_step_).count() < config_.node.map_period_s) {
+      return false;
+    }
+    // When the network does not keep up, steps become fewer and larger instead of a queue that
+    // grows.
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!deltas_waiting_.empty() || !tiles_waiting_.empty()) return false;
   }
-  for (const MapTile& tile : delta->changed) tiles_waiting_.push_back(tile.key);
-  for (const MapTile& tile : delta->changed) changed_.insert(tile.key);
-  changed_.insert(delta->removed.begin(), delta->removed.end());
-  tiles_waiting_.insert(tiles_waiting_.end(), delta->removed.begin(), delta->removed.end());
-  send_waiting();
+  last_step_ = time;
   return true;
+}
+
+void MapPublication::send_step(std::optional<MapDelta> step, StampNs stamp_ns) {
+  if (!step) return;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    publisher_.take_over(*step);
+    stamp_ns_ = stamp_ns;
+    for (const MapTile& tile : step->changed) tiles_waiting_.push_back(tile.key);
+    for (const MapTile& tile : step->changed) changed_.insert(tile.key);
+    changed_.insert(step->removed.begin(), step->removed.end());
+    tiles_waiting_.insert(tiles_waiting_.end(), step->removed.begin(), step->removed.end());
+    deltas_waiting_.push_back(delta_parts(std::move(*step), map_id_, stamp_ns, kPartBytes));
+  }
+  wakeup_.wake();
 }
 
 void MapPublication::send_waiting() {
@@ -70,10 +78,15 @@ void MapPublication::send_waiting() {
 }
 
 bool MapPublication::send_delta() {
+  std::unique_lock<std::mutex> lock(mutex_);
   if (deltas_waiting_.empty()) return false;
-  auto& message = deltas_waiting_.front();
+  DeltaParts& step = deltas_waiting_.front();  // stays where it is: the other thread only appends
+  auto message = step.next();
+  lock.unlock();
   budget_.spend(network_bytes(payload_bytes(message), deltas_));
   deltas_.write(message);  // one that is refused is a gap, which mirrors repair
+  lock.lock();
+  if (step.left() > 0) return true;
   deltas_waiting_.pop_front();
   if (deltas_waiting_.empty()) {
     announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size()};
@@ -82,12 +95,14 @@ bool MapPublication::send_delta() {
 }
 
 bool MapPublication::send_tile() {
+  std::unique_lock<std::mutex> lock(mutex_);
   if (tiles_waiting_.empty()) return false;
   const TileKey key = tiles_waiting_.front();
-  const auto tile = publisher_.tiles().find(key);
-  const bool present = tile != publisher_.tiles().end();
-  auto message =
-      tile_message(present ? tile->second : MapTile{key, 0, {}}, map_id_, publisher_.epoch());
+  const auto known = publisher_.tiles().find(key);
+  const bool present = known != publisher_.tiles().end();
+  const MapTile tile = present ? known->second : MapTile{key, 0, {}};
+  lock.unlock();
+  auto message = tile_message(tile, map_id_, publisher_.epoch());
   // One that is refused is tried again next time: nobody would miss it otherwise.
   if (present) {
     if (!tiles_.write(message)) return false;
@@ -96,21 +111,21 @@ bool MapPublication::send_tile() {
     if (!tiles_.dispose(message)) return false;
     on_bus_.erase(key);
   }
-  const std::size_t bytes = message.payload().size();
-  step_bytes_ += bytes;
-  budget_.spend(network_bytes(bytes, tiles_));
+  step_bytes_ += tile.payload.size();
+  budget_.spend(network_bytes(tile.payload.size(), tiles_));
+  lock.lock();
   tiles_waiting_.pop_front();
   return true;
 }
 
 bool MapPublication::send_reply() {
-  if (replies_waiting_.empty()) return false;
-  auto& message = replies_waiting_.front();
+  if (!reply_waiting_) return false;
+  auto message = reply_waiting_->next();
   const std::size_t bytes = payload_bytes(message);
   snapshot_bytes_ += bytes;
   budget_.spend(network_bytes(bytes, replies_));
   replies_.write(message);
-  replies_waiting_.pop_front();
+  if (reply_waiting_->left() == 0) reply_waiting_.reset();
   answered_ = std::chrono::steady_clock::now();
   return true;
 }
@@ -120,7 +135,10 @@ void MapPublication::send_manifest(std::size_t objects, bool final_version) {
   manifest.map_id(map_id_);
   manifest.epoch(publisher_.epoch());
   manifest.version(announced_.version);
-  manifest.stamp(to_time(stamp_ns_));
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    manifest.stamp(to_time(stamp_ns_));
+  }
   manifest.frame_id(config_.node.map_frame);
   manifest.voxel_size(config_.pipeline.map.voxel_size_m);
   manifest.truncation(config_.pipeline.map.truncation_m());
@@ -138,11 +156,11 @@ void MapPublication::answer_requests() {
   while (requests_.take(request, meta)) {
     if (!meta.valid || request.map_id() != map_id_) continue;
     const bool same_run = request.epoch() == publisher_.epoch();
-    const std::uint64_t held = same_run ? std::min(request.version(), publisher_.version()) : 0;
+    const std::uint64_t held = same_run ? request.version() : 0;
     wanted_ = wanted_ ? std::min(*wanted_, held) : held;
     asked_ = std::chrono::steady_clock::now();
   }
-  if (!wanted_ || !replies_waiting_.empty()) return;
+  if (!wanted_ || reply_waiting_) return;
   // Who asks has a reader of replies; this side may hear of it later, or it has gone again.
   if (replies_.matched() == 0) {
     if (std::chrono::steady_clock::now() - asked_ >= kLongestReply) wanted_.reset();
@@ -155,19 +173,31 @@ void MapPublication::answer_requests() {
     return;
   }
   ++snapshots_;
-  auto messages = snapshot_messages(publisher_, *wanted_, map_id_, kPartBytes);
-  std::move(messages.begin(), messages.end(), std::back_inserter(replies_waiting_));
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::uint64_t held = std::min(*wanted_, publisher_.version());
+    reply_waiting_ = snapshot_parts(publisher_, held, map_id_, kPartBytes);
+  }
   wanted_.reset();
 }
 
+std::size_t MapPublication::waiting() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::size_t messages = tiles_waiting_.size() + (reply_waiting_ ? reply_waiting_->left() : 0);
+  for (const DeltaParts& step : deltas_waiting_) messages += step.left();
+  return messages;
+}
+
+bool MapPublication::deltas_written() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return deltas_waiting_.empty();
+}
+
 MapTraffic MapPublication::traffic() const {
-  return {publisher_.tiles().size(),
-          publisher_.bytes(),
-          publisher_.area_m2(),
-          step_bytes_,
-          snapshot_bytes_,
-          snapshots_,
-          waiting()};
+  const std::size_t messages = waiting();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return {publisher_.version(), publisher_.tiles().size(), publisher_.bytes(), publisher_.area_m2(),
+          step_bytes_,          snapshot_bytes_,           snapshots_,         messages};
 }
 
 bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {

@@ -4,10 +4,11 @@
 #include <chrono>
 #include <deque>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <set>
 
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/byte_budget.hpp"
@@ -19,36 +20,50 @@ namespace pocd::dds {
 
 /// What is to be sent waits here and leaves at `node.map_rate_mb_s`: deltas first, then tiles, then
 /// parts of snapshots. Paced here and not by a flow controller of Fast DDS, see
-/// docs/decisions/0004-pacing-of-map-data.md. Not thread-safe.
+/// docs/decisions/0004-pacing-of-map-data.md.
+///
+/// For two threads: one changes the map and makes steps of it, one sends. Neither compresses nor
+/// writes to the bus while the other has to wait for it.
 class MapPublication {
  public:
-  /// `wakeup` is woken by requests for snapshots and must outlive it.
+  /// `wakeup` is woken by requests for snapshots and by new steps, and must outlive it.
   MapPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
                  std::uint64_t epoch, Wakeup& wakeup);
 
-  /// Makes a step of what has changed, when the period is over and the step before has left, or
-  /// `now`. True when it did: all that the map held is in the steps.
-  bool send_due(TsdfMap& map, StampNs stamp_ns, bool now);
-  /// What the map is, as far as its deltas have left; `final_version` at the end of a run.
-  void send_manifest(std::size_t objects, bool final_version);
-  /// One reply for all that wait, when the one before has arrived.
-  void answer_requests();
+  // The thread that changes the map:
+
+  /// A step is to be made, because the period is over and the step before has left, or `now`.
+  bool begin_step(bool now);
+  /// What has changed since the last step, if anything.
+  std::optional<MapDelta> make_step(TsdfMap& map) const { return publisher_.make_step(map); }
+  /// Takes over what make_step() made.
+  void send_step(std::optional<MapDelta> step, StampNs stamp_ns);
+
+  // The thread that sends:
+
   /// As much as the rate allows. To be called often, as long as something is waiting().
   void send_waiting();
+  /// One reply for all that wait, when the one before has arrived.
+  void answer_requests();
+  /// What the map is, as far as its deltas have left; `final_version` at the end of a run.
+  void send_manifest(std::size_t objects, bool final_version);
   /// Messages that are to be sent.
-  std::size_t waiting() const {
-    return deltas_waiting_.size() + tiles_waiting_.size() + replies_waiting_.size();
-  }
-  /// The deltas of all steps have been written.
-  bool deltas_written() const { return deltas_waiting_.empty(); }
+  std::size_t waiting() const;
+  MapTraffic traffic() const;
   bool wait_acknowledged(std::chrono::milliseconds time);
 
+  // Any thread:
+
+  /// The deltas of all steps have been written.
+  bool deltas_written() const;
+  std::uint64_t failures() const;
+  /// As long as it is held, publisher() and changed() stay as they are.
+  [[nodiscard]] std::unique_lock<std::mutex> hold() const {
+    return std::unique_lock<std::mutex>(mutex_);
+  }
   const MapPublisher& publisher() const { return publisher_; }
   /// Tiles that steps have changed or removed; for the reader to empty.
   std::set<TileKey>& changed() { return changed_; }
-  StampNs stamp_ns() const { return stamp_ns_; }
-  MapTraffic traffic() const;
-  std::uint64_t failures() const;
 
  private:
   bool send_delta();
@@ -63,23 +78,31 @@ class MapPublication {
 
   const NodeFile config_;
   const std::uint32_t map_id_;
-  MapPublisher publisher_;
+  Wakeup& wakeup_;
   Writer<pocd_msgs::msg::MapTilePubSubType> tiles_;
   Writer<pocd_msgs::msg::MapDeltaPubSubType> deltas_;
   Writer<pocd_msgs::msg::MapManifestPubSubType> manifest_;
   Writer<pocd_msgs::msg::MapSnapshotReplyPubSubType> replies_;
   Reader<pocd_msgs::msg::MapSnapshotRequestPubSubType> requests_;
+
+  // Only the thread that makes steps.
+  std::chrono::steady_clock::time_point last_step_{};
+
+  mutable std::mutex mutex_;  // what both threads use
+  MapPublisher publisher_;    // the thread that makes steps may read it without
   StampNs stamp_ns_ = 0;
+  std::deque<DeltaParts> deltas_waiting_;
+  std::deque<TileKey> tiles_waiting_;  // what they are is looked up when they leave
+  std::set<TileKey> changed_;
+
+  // Only the thread that sends.
   Announced announced_;
   ByteBudget budget_;
-  std::deque<pocd_msgs::msg::MapDelta> deltas_waiting_;
-  std::deque<TileKey> tiles_waiting_;  // what they are is looked up when they leave
-  std::set<TileKey> on_bus_, changed_;
-  std::deque<pocd_msgs::msg::MapSnapshotReply> replies_waiting_;
+  std::set<TileKey> on_bus_;
+  std::optional<SnapshotParts> reply_waiting_;
   std::uint64_t step_bytes_ = 0, snapshot_bytes_ = 0, snapshots_ = 0;
   std::optional<std::uint64_t> wanted_;  // version that subscribers who wait have at least
   std::chrono::steady_clock::time_point asked_{}, answered_{};
-  std::chrono::steady_clock::time_point last_sent_{};
 };
 
 }  // namespace pocd::dds

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -41,7 +42,7 @@ struct Node::Impl {
         latency(options.latency_file),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
-        clock(participant, config.node.use_clock, wakeup),
+        clock(participant, config.node.use_clock, outputs_wakeup),
         rivals(participant, {static_cast<std::uint32_t>(config.node.map_id), options.epoch},
                wakeup),
         frames(participant, options.epoch),
@@ -49,14 +50,20 @@ struct Node::Impl {
         map(participant, config, options.epoch, wakeup),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
         intake(participant, config.node, config.pipeline.classes, watch, queue, latency),
-        worker([this] { work(); }) {}
+        worker([this] { guard([this] { work(); }); }),
+        drawer([this] { guard([this] { draw(); }); }) {}
 
   ~Impl() {
     intake.stop();
     if (worker.joinable()) worker.join();
+    stop_drawing();
   }
 
+  /// What a thread ends with is what run() throws.
+  void guard(const std::function<void()>& task);
   void work();
+  void draw();
+  void stop_drawing();
   void process(const Frame& frame);
   void publish(bool now);
   void look_for_rivals(IntakeStatus& input);
@@ -73,14 +80,18 @@ struct Node::Impl {
   FrameQueue queue;
   Wakeup wakeup;
 
-  // run()'s thread only.
+  // The drawing thread only, until it has ended.
+  Wakeup outputs_wakeup;
   RosOutputs outputs;
-  NodeClock clock;
+  NodeClock clock;  // thread-safe
+  std::atomic<bool> drawn{false};
+
+  // run()'s thread only.
   RivalWatch rivals;
   Clock::time_point status_sent{};
   bool map_waits = false;
 
-  // Guards everything below that the worker and run() both use.
+  // Guards everything below that several threads use; the map has a lock of its own.
   mutable std::mutex mutex;
   FrameLog frames;
   ObjectPublication objects;
@@ -93,25 +104,42 @@ struct Node::Impl {
   std::atomic<bool> failed{false};
 
   Intake intake;
-  std::thread worker;
+  std::thread worker, drawer;
 };
 
-void Node::Impl::work() {
+void Node::Impl::guard(const std::function<void()>& task) {
   try {
-    while (!queue.finished()) {
-      const std::optional<Frame> frame = queue.pop(kPoll);
-      if (frame) {
-        intake.room_made();
-        process(*frame);
-      }
-      publish(false);
-    }
-    publish(true);
+    task();
   } catch (...) {
     const std::lock_guard<std::mutex> lock(mutex);
     failure = std::current_exception();
     failed = true;
   }
+}
+
+void Node::Impl::work() {
+  while (!queue.finished()) {
+    const std::optional<Frame> frame = queue.pop(kPoll);
+    if (frame) {
+      intake.room_made();
+      process(*frame);
+    }
+    publish(false);
+  }
+  publish(true);
+}
+
+void Node::Impl::draw() {
+  while (!drawn) {
+    outputs_wakeup.wait_for(kPoll);
+    send_outputs(false);
+  }
+}
+
+void Node::Impl::stop_drawing() {
+  drawn = true;
+  outputs_wakeup.wake();
+  if (drawer.joinable()) drawer.join();
 }
 
 void Node::Impl::process(const Frame& frame) {
@@ -143,10 +171,20 @@ void Node::Impl::process(const Frame& frame) {
 }
 
 void Node::Impl::publish(bool now) {
-  const std::lock_guard<std::mutex> lock(mutex);
   const double cpu_ms = thread_cpu_ms();
-  objects.send_due(now);
-  if (map.send_due(pipeline.map(), counts.stamp_ns, now)) latency.in_step();
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    objects.send_due(now);
+  }
+  // Compressed while the others go on; only this thread changes what it reads.
+  const bool step = map.begin_step(now);
+  std::optional<MapDelta> delta;
+  if (step) delta = map.make_step(pipeline.map());
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (step) {
+    map.send_step(std::move(delta), counts.stamp_ns);
+    latency.in_step();
+  }
   if (map.deltas_written()) latency.written();
   counts.publishing_cpu_ms += thread_cpu_ms() - cpu_ms;
 }
@@ -177,7 +215,6 @@ void Node::Impl::send_status(const std::string& state) {
   counts.process_cpu_ms = process_cpu_ms();
   counts.write_failures = objects.failures() + map.failures() + frames.failures();
   counts.map = map.traffic();
-  counts.map_version = map.publisher().version();
   counts.objects = objects.objects().size();
   map.send_manifest(counts.objects, state == "stopped");
   status.send(input, counts, queue.size(), queue.dropped(), state, clock.now_ns());
@@ -187,6 +224,7 @@ void Node::Impl::send_outputs(bool last) {
   const StampNs now_ns = clock.now_ns();
   {
     const std::lock_guard<std::mutex> lock(mutex);
+    const auto held = map.hold();
     outputs.collect({objects.objects(), objects.touched()},
                     {map.publisher().tiles(), map.changed()}, counts.stamp_ns, now_ns, last);
   }
@@ -195,24 +233,24 @@ void Node::Impl::send_outputs(bool last) {
 
 void Node::Impl::turn() {
   wakeup.wait_for(map_waits ? kMapTurn : kPoll);
+  map.answer_requests();
+  map.send_waiting();
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    map.answer_requests();
-    map.send_waiting();
     if (map.deltas_written()) latency.written();
-    map_waits = map.waiting() > 0;
   }
+  map_waits = map.waiting() > 0;
   const auto now = Clock::now();
   if (seconds(now - status_sent) >= kStatusPeriodS) {
     status_sent = now;
     send_status("running");
   }
-  send_outputs(false);
 }
 
 bool Node::Impl::finish() {
   intake.stop();
   worker.join();
+  stop_drawing();
   if (failure) std::rethrow_exception(failure);
   const auto wait =
       std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));

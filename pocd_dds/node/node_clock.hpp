@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <mutex>
 
 #include "pocd/common/types.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
@@ -12,7 +13,7 @@
 namespace pocd::dds {
 
 /// The wall clock, or what a replay says on rt/clock, so that those who live in its time (ROS:
-/// use_sim_time) find stamps of their own time. Not thread-safe.
+/// use_sim_time) find stamps of their own time. Thread-safe.
 class NodeClock {
  public:
   NodeClock(const std::shared_ptr<Participant>& participant, bool use_clock, Wakeup& wakeup) {
@@ -28,6 +29,7 @@ class NodeClock {
                  std::chrono::system_clock::now().time_since_epoch())
           .count();
     }
+    const std::lock_guard<std::mutex> lock(mutex_);
     rosgraph_msgs::msg::Clock message;
     SampleMeta meta;
     while (reader_->take(message, meta)) {
@@ -38,6 +40,7 @@ class NodeClock {
 
  private:
   std::unique_ptr<Reader<rosgraph_msgs::msg::ClockPubSubType>> reader_;
+  std::mutex mutex_;
   StampNs heard_ns_ = 0;
 };
 

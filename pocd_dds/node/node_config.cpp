@@ -7,6 +7,26 @@
 
 namespace pocd::dds {
 
+namespace {
+
+bool has_blank(const std::string& text) {
+  return std::any_of(text.begin(), text.end(),
+                     [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; });
+}
+
+/// Names that no writer on the bus has: one would wait for them for ever.
+void add_topic_problem(const std::string& topic, const std::string& where,
+                       std::vector<std::string>& problems) {
+  if (!topic.empty() && topic[0] == '/') {
+    problems.push_back(where + ": \"" + topic + "\" is a name of ROS, on the bus it is \"rt" +
+                       topic + "\"");
+  } else if (has_blank(topic)) {
+    problems.push_back(where + ": \"" + topic + "\" has a blank in it");
+  }
+}
+
+}  // namespace
+
 std::vector<std::string> MountConfig::inconsistencies() const {
   const double length = std::sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
   if (std::abs(length - 1.0) <= 1e-3) return {};
@@ -38,10 +58,23 @@ std::vector<std::string> NodeConfig::inconsistencies() const {
   std::set<std::string> names;
   for (const RobotConfig& robot : robots) {
     if (robot.name.empty()) problems.push_back("robots: a robot has no name");
+    if (has_blank(robot.name)) {
+      problems.push_back("robots: the name \"" + robot.name + "\" has a blank in it");
+    }
+    for (const std::string& topic :
+         {robot.depth_topic, robot.camera_info_topic, robot.segmentation_topic, robot.color_topic,
+          robot.odometry_topic}) {
+      add_topic_problem(topic, "robots: " + robot.name, problems);
+    }
     if (!robot.name.empty() && !names.insert(robot.name).second) {
       problems.push_back("robots: the name " + robot.name + " is used twice");
     }
   }
+  for (const std::string& pattern : topics.of_each_robot()) {
+    add_topic_problem(pattern, "topics", problems);
+  }
+  add_topic_problem(topics.tf, "topics", problems);
+  add_topic_problem(topics.tf_static, "topics", problems);
   if (robots.size() > 1 || discover_robots) {
     for (const std::string& pattern : topics.of_each_robot()) {
       if (pattern.find("{robot}") == std::string::npos) {

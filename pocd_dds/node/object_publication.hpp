@@ -6,7 +6,7 @@
 #include <memory>
 #include <set>
 
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/node_config.hpp"
 #include "pocd_msgsPubSubTypes.h"

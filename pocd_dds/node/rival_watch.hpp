@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_msgsPubSubTypes.h"
 

@@ -25,6 +25,13 @@ std::string whole_seconds(double seconds) {
 
 StampNs nanoseconds(double seconds) { return static_cast<StampNs>(seconds * 1e9); }
 
+std::string text_of(const CameraModel& camera) {
+  char text[120];
+  std::snprintf(text, sizeof text, "%d x %d, fx %.6g, fy %.6g, cx %.6g, cy %.6g", camera.width,
+                camera.height, camera.fx, camera.fy, camera.cx, camera.cy);
+  return text;
+}
+
 StreamUse use_of(const std::string& word) {
   if (word == "absent") return StreamUse::kAbsent;
   return word == "required" ? StreamUse::kRequired : StreamUse::kOptional;
@@ -106,6 +113,9 @@ void RobotInput::drain(bool hold) {
   source_left_ = had_source_ && !live_before && !hold;
   drain_poses();
   drain_camera_info();
+  for (ImageReader* reader : {depth_.get(), segmentation_.get(), color_.get()}) {
+    if (reader != nullptr) problems_.count_incompatible(*reader);
+  }
   if (hold) return;
   if (segmentation_) drain_images(Stream::kSegmentation, *segmentation_);
   if (color_) drain_images(Stream::kColor, *color_);
@@ -113,6 +123,7 @@ void RobotInput::drain(bool hold) {
 }
 
 void RobotInput::drain_camera_info() {
+  problems_.count_incompatible(camera_info_);
   sensor_msgs::msg::CameraInfo info;
   SampleMeta meta;
   while (camera_info_.take(info, meta)) {
@@ -123,11 +134,20 @@ void RobotInput::drain_camera_info() {
       problems_.count(camera_info_.topic(), *camera.problem);
     } else if (!synchronizer_.add_camera_info(to_stamp(info.header().stamp()), *camera.value)) {
       problems_.count(camera_info_.topic(), backwards(to_stamp(info.header().stamp())));
+    } else {
+      if (camera_ && *camera_ != *camera.value) {
+        problems_.count(
+            camera_info_.topic(),
+            {InputReason::kCameraChanged, text_of(*camera_) + " became " + text_of(*camera.value) +
+                                              ", which is used from here on"});
+      }
+      camera_ = camera.value;
     }
   }
 }
 
 void RobotInput::drain_poses() {
+  problems_.count_incompatible(odometry_);
   if (tf_ && tf_->drain(transforms_, problems_)) heard(Stream::kPose);
   nav_msgs::msg::Odometry message;
   SampleMeta meta;
@@ -327,6 +347,7 @@ std::optional<std::vector<std::string>> RobotInput::settle_departure() {
   transforms_.forget_moving();
   heard_.clear();
   given_up_.reset();
+  camera_.reset();
   if (robot_.camera_frame.empty()) camera_frame_.clear();
   return frames;
 }

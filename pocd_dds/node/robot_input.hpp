@@ -4,6 +4,7 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -95,7 +96,8 @@ class RobotInput {
   const std::string map_frame_;
   const bool lossless_;
   const double silent_wait_s_;
-  std::string camera_frame_;  ///< "" until the first depth image
+  std::string camera_frame_;           ///< "" until the first depth image
+  std::optional<CameraModel> camera_;  ///< as its source said last
   const ColourTable& colours_;
   ProblemCounter& problems_;
   LatencyLog& latency_;

@@ -16,8 +16,7 @@ std::string lease_text(double lease_s) {
 
 }  // namespace
 
-Roster::Roster(const NodeConfig& node, ProblemCounter& problems)
-    : discovers_(node.discovers()), pattern_(node.topics.depth), problems_(problems) {
+Roster::Roster(const NodeConfig& node) : discovers_(node.discovers()), pattern_(node.topics.depth) {
   for (const RobotConfig& robot : node.robots) {
     const std::string topic =
         robot.depth_topic.empty() ? robot_topic(pattern_, robot.name) : robot.depth_topic;
@@ -66,12 +65,7 @@ std::vector<RosterChange> Roster::hear(const BusEvent& event, Clock::time_point 
       if (!endpoint.writer) break;
       const std::string robot = robot_of(endpoint.topic);
       if (robot.empty()) break;
-      if (endpoint.type != topics::kDepth.type) {
-        problems_.count(endpoint.topic,
-                        {InputReason::kWrongType, "announced with type " + endpoint.type +
-                                                      ", expected " + topics::kDepth.type});
-        break;
-      }
+      if (endpoint.type != topics::kDepth.type) break;
       if (!writers_.emplace(endpoint.key, Writer{robot, event.participant}).second) break;
       if (leaving_.erase(robot) > 0) changes.push_back({robot, false, kTakenBack});
       if (++writers_of_[robot] == 1) changes.push_back({robot, true, ""});

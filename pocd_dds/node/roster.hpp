@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/node_config.hpp"
 
@@ -30,8 +29,7 @@ class Roster {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `problems` must outlive it.
-  Roster(const NodeConfig& node, ProblemCounter& problems);
+  explicit Roster(const NodeConfig& node);
 
   /// What the event changes.
   std::vector<RosterChange> hear(const BusEvent& event, Clock::time_point now);
@@ -50,7 +48,6 @@ class Roster {
 
   const bool discovers_;
   const std::string pattern_;
-  ProblemCounter& problems_;
   std::map<std::string, std::string> named_;  // robot by depth topic
   std::set<std::string> names_;               // of named_
   std::map<EndpointKey, Writer> writers_;     // of depth images

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <map>
 
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -100,7 +100,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   health.queue_length(static_cast<std::uint32_t>(queued));
   health.processing_ms(work.processing_ms);
   health.objects(static_cast<std::uint32_t>(work.objects));
-  health.map_version(work.map_version);
+  health.map_version(work.map.version);
 
   diagnostic_msgs::msg::DiagnosticArray diagnostics;
   diagnostics.header().stamp(to_time(now_ns));
@@ -158,7 +158,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   add(node, "CPU of taking images, within the intake [ms]", std::to_string(work.take_cpu_ms));
   add(node, "CPU of the process [ms]", std::to_string(work.process_cpu_ms));
   add(node, "objects", std::to_string(work.objects));
-  add(node, "map version", std::to_string(work.map_version));
+  add(node, "map version", std::to_string(work.map.version));
   add(node, "map tiles", std::to_string(work.map.tiles));
   add(node, "map area [m2]", fixed(work.map.area_m2));
   add(node, "map bytes per m2",

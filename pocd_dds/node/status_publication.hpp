@@ -16,6 +16,7 @@ namespace pocd::dds {
 
 /// The published map and what it costs.
 struct MapTraffic {
+  std::uint64_t version = 0;
   std::size_t tiles = 0;
   std::size_t bytes = 0;                             ///< of all tiles that there are
   double area_m2 = 0.0;                              ///< of floor that tiles stand on
@@ -30,7 +31,7 @@ struct WorkStatus {
   double processing_ms = 0.0;  ///< mean of the last second, 0 without frames
   std::string last_warning;
   std::uint64_t write_failures = 0;
-  std::uint64_t map_version = 0, objects = 0;
+  std::uint64_t objects = 0;
   MapTraffic map;
   MapMemoryStatus memory;
   StampNs stamp_ns = 0;  ///< of the last frame

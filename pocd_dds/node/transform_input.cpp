@@ -21,6 +21,7 @@ bool TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree
   tf2_msgs::msg::TFMessage message;
   SampleMeta meta;
   bool any = false;
+  problems.count_incompatible(reader);
   while (reader.take(message, meta)) {
     if (!meta.valid) continue;
     for (const auto& entry : message.transforms()) {

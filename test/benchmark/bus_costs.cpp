@@ -2,6 +2,7 @@
 // says.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <fstream>
 #include <functional>
 #include <optional>
 #include <thread>
@@ -10,6 +11,7 @@
 #include "bus_costs_site.hpp"
 #include "heap_counter.hpp"
 #include "statistics.hpp"
+#include "udp_profiles.hpp"
 
 namespace pocd::benchmark {
 namespace {
@@ -41,6 +43,18 @@ class Meter {
   std::uint64_t bytes_ = loopback_bytes();
 };
 
+/// Of this process, now.
+struct Memory {
+  double heap_mb = 1e-6 * static_cast<double>(heap_in_use());
+  double resident_mb = process_cost(0).memory_mb;
+
+  std::string text() const {
+    char text[80];
+    std::snprintf(text, sizeof text, "%.0f MB in use, %.0f MB resident", heap_mb, resident_mb);
+    return text;
+  }
+};
+
 void print_delays(const char* what, MemberReport report) {
   std::printf(
       "| object state to a robot, %s | median %.1f ms, 99 %% %.1f ms, longest %.1f ms (%.0f "
@@ -52,7 +66,7 @@ void print_delays(const char* what, MemberReport report) {
 class Run {
  public:
   explicit Run(const Options& options) : options_(options) {
-    write_udp_profiles(folder_.path() / "udp.xml");
+    std::ofstream(folder_.path() / "udp.xml") << kUdpOnly;
     config_.pipeline = scale_config();
     config_.node.map_rate_mb_s = options.rate_mb_s;
     config_.node.object_period_s = options.object_period_s;
@@ -87,7 +101,7 @@ class Run {
   }
 
   void map() {
-    const ProcessCost before = process_cost(0);
+    const Memory before;
     publisher_.emplace(
         *site_, config_,
         dds::BusOptions{options_.domain, (folder_.path() / "udp.xml").string(), "costs"});
@@ -105,21 +119,30 @@ class Run {
     std::printf("| making all of it | %.1f s of CPU |\n", meter.cpu_s());
     serve_for(1.0, 0);
     while (publisher_->map().waiting() > 0) serve_for(0.1, 0);
-    std::printf("| memory of publication and history | %.0f MB; pipeline and voxels %.0f MB |\n",
-                process_cost(0).memory_mb - before.memory_mb, before.memory_mb);
-    dds::SurfacePoints surface(config_.pipeline.map.voxel_size_m,
-                               config_.pipeline.map.truncation_m());
-    std::vector<TileKey> keys;
-    for (const auto& [key, tile] : publisher_->map().publisher().tiles()) keys.push_back(key);
-    surface.apply(publisher_->map().publisher().tiles(), keys, {});
-    constexpr double kPointBytes = 24.0;
-    std::printf("| rt/pocd/surface, while somebody listens | %.1f MB each time |\n",
-                1e-6 * kPointBytes * static_cast<double>(surface.size()));
+    const Memory published;
+    std::printf("| memory: pipeline and voxels | %s |\n", before.text().c_str());
+    std::printf("| memory: with publication and history | %s |\n", published.text().c_str());
+    surface();
     std::printf(
         "| changed by one robot | %.1f tiles per step of %.1f s, %.1f KB/s; %.1f object states/s, "
         "%.2f events/s |\n",
         load_.tiles_per_step, config_.node.map_period_s, 1e-3 * load_.tile_bytes_per_s,
         load_.states_per_s, load_.events_per_s);
+  }
+
+  /// Somebody looks at the surface.
+  void surface() {
+    Member viewer(member("surface"));
+    const Meter meter;
+    publisher_->serve([&] { return !viewer.running(); }, load_, 0);
+    const Memory after;
+    const double cpu_s = meter.cpu_s();
+    const TopicTraffic sum = viewer.finish().topics[dds::topics::kSurface.name];
+    std::printf(
+        "| rt/pocd/surface, while somebody listens | %.1f MB each time, the first time %.1f s of "
+        "CPU |\n",
+        1e-6 * sum.bytes / sum.messages, cpu_s);
+    std::printf("| memory: after the surface was sent | %s |\n", after.text().c_str());
   }
 
   /// One who has nothing, while ten robots change the map and a robot waits for objects.
@@ -207,8 +230,8 @@ class Run {
     serve_for(options_.seconds, options_.robots);
     const double seconds = meter.seconds(), mb = meter.mb(), cpu_s = meter.cpu_s();
     std::printf("| over the network, all | %.2f MB/s |\n", mb / seconds);
-    std::printf("| publisher | %.0f %% of a core, %.0f MB with voxels and pipeline |\n",
-                100.0 * cpu_s / seconds, process_cost(0).memory_mb);
+    std::printf("| publisher | %.0f %% of a core; with voxels and pipeline %s |\n",
+                100.0 * cpu_s / seconds, Memory().text().c_str());
     std::printf("| a robot | %.2f %% of a core |\n",
                 100.0 * (cpu_of() - robots_cpu) / seconds / options_.robots);
     std::printf("| a mirror | %.1f %% of a core, %.0f MB |\n",

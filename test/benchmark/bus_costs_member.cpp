@@ -18,6 +18,7 @@
 #include "pocd_dds/map_mirror.hpp"
 #include "pocd_msgsPubSubTypes.h"
 #include "rmf_obstacle_msgsPubSubTypes.h"
+#include "sensor_msgsPubSubTypes.h"
 #include "statistics.hpp"
 #include "visualization_msgsPubSubTypes.h"
 
@@ -38,8 +39,12 @@ StampNs now_ns() {
 /// Readers of one participant.
 class Listener {
  public:
-  Listener(const MemberOptions& options, bool everything, dds::Wakeup& wakeup)
+  Listener(const MemberOptions& options, dds::Wakeup& wakeup)
       : bus_(std::make_shared<dds::Participant>(bus_options(options))), wakeup_(wakeup) {
+    if (options.kind == "surface") {
+      read<sensor_msgs::msg::PointCloud2PubSubType>(dds::topics::kSurface);
+      return;
+    }
     read<ObjectStatePubSubType>(dds::topics::kObjects, [this](const ObjectState& state) {
       // What was there before belongs to the history that one who joins gets.
       const StampNs sent_ns = dds::to_stamp(state.header().stamp());
@@ -47,7 +52,7 @@ class Listener {
     });
     read<ObjectEventPubSubType>(dds::topics::kObjectEvents);
     read<NodeHealthPubSubType>(dds::topics::kHealth);
-    if (!everything) return;
+    if (options.kind != "everything") return;
     read<MapDeltaPubSubType>(dds::topics::kMapDeltas);
     read<MapTilePubSubType>(dds::topics::kMapTiles);
     read<MapManifestPubSubType>(dds::topics::kMapManifest);
@@ -101,11 +106,11 @@ void listen(const MemberOptions& options) {
   dds::Wakeup wakeup;
   std::vector<std::unique_ptr<Listener>> listeners;
   for (int i = 0; i < options.participants; ++i) {
-    const bool everything = options.kind == "everything";
-    listeners.push_back(std::make_unique<Listener>(options, everything, wakeup));
+    listeners.push_back(std::make_unique<Listener>(options, wakeup));
   }
   bool told = false;
-  while (!stopping) {
+  const bool once = options.kind == "surface";
+  while (!stopping && !(once && !listeners.front()->traffic.empty())) {
     wakeup.wait_for(std::chrono::milliseconds(100));
     for (const auto& listener : listeners) listener->take();
     if (begin_anew.exchange(false)) {
@@ -176,7 +181,7 @@ int run_member(const MemberOptions& options) {
   std::signal(SIGTERM, stop);
   std::signal(SIGUSR1, [](int) { begin_anew = true; });
   int result = 0;
-  if (options.kind == "robot" || options.kind == "everything") {
+  if (options.kind == "robot" || options.kind == "everything" || options.kind == "surface") {
     listen(options);
   } else {
     result = mirror(options);

@@ -15,8 +15,9 @@ namespace pocd::benchmark {
 struct MemberOptions {
   int domain = 0;
   std::string profiles;
-  /// robot: objects, events and health; everything: all topics but the surface; tiles, snapshot: a
-  /// mirror that ends when it is in step; follow: a mirror that goes on
+  /// robot: objects, events and health; everything: all topics but the surface; surface: that, and
+  /// ends when it has come; tiles, snapshot: a mirror that ends when it is in step; follow: a
+  /// mirror that goes on
   std::string kind = "robot";
   int participants = 1;
   double lease_s = 5.0;

@@ -34,19 +34,6 @@ std::uint64_t loopback_bytes() {
   return 0;
 }
 
-void write_udp_profiles(const std::filesystem::path& file) {
-  std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
-<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
-  <transport_descriptors><transport_descriptor>
-    <transport_id>udp</transport_id><type>UDPv4</type>
-    <sendBufferSize>4194304</sendBufferSize><receiveBufferSize>4194304</receiveBufferSize>
-  </transport_descriptor></transport_descriptors>
-  <participant profile_name="udp" is_default_profile="true"><rtps>
-    <userTransports><transport_id>udp</transport_id></userTransports>
-    <useBuiltinTransports>false</useBuiltinTransports>
-  </rtps></participant></profiles></dds>)";
-}
-
 ProcessCost process_cost(pid_t pid) {
   const std::string folder = pid == 0 ? "/proc/self/" : "/proc/" + std::to_string(pid) + "/";
   ProcessCost cost;

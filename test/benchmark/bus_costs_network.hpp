@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 
 #include <sys/types.h>
@@ -16,10 +15,6 @@ std::string enter_own_network(double link_mbit);
 
 /// Bytes that went over the loopback interface, with all headers.
 std::uint64_t loopback_bytes();
-
-/// Profiles that make every participant talk UDP, as hosts of a fleet do; shared memory would hide
-/// what is sent.
-void write_udp_profiles(const std::filesystem::path& file);
 
 struct ProcessCost {
   double cpu_s = 0.0;

@@ -13,6 +13,7 @@ constexpr std::uint64_t kEpoch = 1;
 constexpr double kSpeed_mps = 1.2, kFrameRate_hz = 15.0;
 constexpr std::chrono::milliseconds kTurn{5};
 constexpr std::chrono::milliseconds kTick{33};
+constexpr int kMostTicksLate = 4;  // a node drops frames that wait for longer
 
 double seconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double>(time).count();
@@ -80,16 +81,17 @@ SitePublisher::SitePublisher(Site& site, const dds::NodeFile& config, const dds:
 
 void SitePublisher::publish_all() {
   touch_all(site_.pipeline().map());
-  map_.send_due(site_.pipeline().map(), 1, true);
+  map_.begin_step(true);
+  map_.send_step(map_.make_step(site_.pipeline().map()), 1);
   FrameResult all;
   all.changed_objects = snapshots_;
   objects_.add(all, wall_ns());
   objects_.send_due(true);
 }
 
-void SitePublisher::write_objects(const DriveLoad& load, int robots, double seconds) {
+void SitePublisher::write_objects(const DriveLoad& load, int robots, double seconds,
+                                  StampNs stamp_ns) {
   FrameResult result;
-  const StampNs now_ns = wall_ns();
   for (states_due_ += load.states_per_s * robots * seconds; states_due_ >= 1.0; --states_due_) {
     // What a robot looks at for some seconds.
     const auto robot = random_.below(static_cast<std::uint64_t>(robots));
@@ -104,14 +106,14 @@ void SitePublisher::write_objects(const DriveLoad& load, int robots, double seco
     event.kind = EventKind::kUpdated;
     event.object = object.id;
     event.class_id = object.class_id;
-    event.stamp_ns = now_ns;
+    event.stamp_ns = stamp_ns;
     event.robot = object.last_robot;
     event.box = object.box;
     event.previous_box = object.box;
     event.evidence.rule = "geometric_change";
     result.events.push_back(event);
   }
-  objects_.add(result, now_ns);
+  objects_.add(result, stamp_ns);
   objects_.send_due(false);
 }
 
@@ -142,45 +144,60 @@ void SitePublisher::send_status(int robots) {
   }
   dds::WorkStatus work;
   work.map = map_.traffic();
-  work.objects = objects_.objects().size();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    work.objects = objects_.objects().size();
+  }
   map_.send_manifest(work.objects, false);
   status_.send(input, work, 0, 0, "running", wall_ns());
 }
 
 void SitePublisher::work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots) {
-  auto ticked = Clock::now(), stepped = ticked;
+  auto tick = Clock::now(), ticked = tick;
+  change_map(load, robots);
   while (!stopping) {
-    std::this_thread::sleep_for(kTick);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    const auto now = Clock::now();
-    write_objects(load, robots, seconds(now - ticked));
-    ticked = now;
-    if (seconds(now - stepped) < config_.node.map_period_s || map_.waiting() > 0) continue;
-    stepped = now;
+    // Frames come when they come: all that holds one up here counts as its delay.
+    tick = std::max(tick + kTick, Clock::now() - kMostTicksLate * kTick);
+    std::this_thread::sleep_until(tick);
+    const StampNs stamp_ns = wall_ns() - std::chrono::nanoseconds(Clock::now() - tick).count();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      write_objects(load, robots, seconds(tick - ticked), stamp_ns);
+      ticked = tick;
+    }
+    if (!map_.begin_step(false)) continue;
+    map_.send_step(map_.make_step(site_.pipeline().map()), stamp_ns);
     change_map(load, robots);
-    map_.send_due(site_.pipeline().map(), wall_ns(), true);
   }
 }
 
-void SitePublisher::serve(const std::function<bool()>& done, const DriveLoad& load, int robots) {
-  std::atomic<bool> stopping{false};
-  std::thread worker;
-  if (robots > 0) worker = std::thread([&] { work(stopping, load, robots); });
-  auto told = Clock::time_point{};
-  while (!done()) {
-    wakeup_.wait_for(kTurn);
+void SitePublisher::draw(const std::atomic<bool>& stopping) {
+  while (!stopping) {
+    std::this_thread::sleep_for(kTick);
     const StampNs now_ns = wall_ns();
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      map_.answer_requests();
-      map_.send_waiting();
-      if (seconds(Clock::now() - told) >= 1.0) told = Clock::now(), send_status(robots);
+      const auto held = map_.hold();
       outputs_.collect({objects_.objects(), objects_.touched()},
                        {map_.publisher().tiles(), map_.changed()}, now_ns, now_ns, false);
     }
     outputs_.send();
   }
+}
+
+void SitePublisher::serve(const std::function<bool()>& done, const DriveLoad& load, int robots) {
+  std::atomic<bool> stopping{false};
+  std::thread worker, drawer([&] { draw(stopping); });
+  if (robots > 0) worker = std::thread([&] { work(stopping, load, robots); });
+  auto told = Clock::time_point{};
+  while (!done()) {
+    wakeup_.wait_for(kTurn);
+    map_.answer_requests();
+    map_.send_waiting();
+    if (seconds(Clock::now() - told) >= 1.0) told = Clock::now(), send_status(robots);
+  }
   stopping = true;
+  drawer.join();
   if (worker.joinable()) worker.join();
 }
 

@@ -29,8 +29,8 @@ struct DriveLoad {
 /// Drives through the first hall of the site at 1.2 m/s, 15 frames per second of data time.
 DriveLoad drive_load(Site& site, double map_period_s, double object_period_s);
 
-/// The component without its pipeline: publishes the site's map and objects, as Node does by a
-/// thread that writes what is new and one for the rest.
+/// The component without its pipeline: publishes the site's map and objects, as Node does, by a
+/// thread that writes what is new, one that sends, and one for the topics of ROS 2 tools.
 class SitePublisher {
  public:
   SitePublisher(Site& site, const dds::NodeFile& config, const dds::BusOptions& bus);
@@ -47,7 +47,8 @@ class SitePublisher {
  private:
   using Clock = std::chrono::steady_clock;
   void work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots);
-  void write_objects(const DriveLoad& load, int robots, double seconds);
+  void draw(const std::atomic<bool>& stopping);
+  void write_objects(const DriveLoad& load, int robots, double seconds, StampNs stamp_ns);
   void change_map(const DriveLoad& load, int robots);
   void send_status(int robots);
 

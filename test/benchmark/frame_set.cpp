@@ -37,6 +37,22 @@ bool is_missing(const std::filesystem::path& folder, FrameSet& set) {
   return true;
 }
 
+FrameSet simulated(const std::string& name, const std::optional<SensorModel>& sensor,
+                   std::size_t limit) {
+  FrameSet set = with_config(name, "simulated.yaml");
+  set.scenario = load_scenario(kSource / "config/sim/torwic/0.yaml");
+  if (sensor) set.scenario->sensor = *sensor;
+  SimReaderOptions options;
+  options.with_color = false;
+  options.threads = 2;
+  SimReader reader(*set.scenario, options);
+  read_all(reader, limit, set);
+  std::vector<OrientedBox> boxes;
+  for (const TruthObject& object : objects_after(*set.scenario, 0)) boxes.push_back(object.box);
+  set.objects.assign(set.frames.size(), boxes);
+  return set;
+}
+
 }  // namespace
 
 std::string data_folder() {
@@ -71,18 +87,10 @@ FrameSet load_tabletop(std::size_t limit) {
   return set;
 }
 
-FrameSet load_circuit(std::size_t limit) {
-  FrameSet set = with_config("circuit", "simulated.yaml");
-  set.scenario = load_scenario(kSource / "config/sim/torwic/0.yaml");
-  SimReaderOptions options;
-  options.with_color = false;
-  options.threads = 2;
-  SimReader reader(*set.scenario, options);
-  read_all(reader, limit, set);
-  std::vector<OrientedBox> boxes;
-  for (const TruthObject& object : objects_after(*set.scenario, 0)) boxes.push_back(object.box);
-  set.objects.assign(set.frames.size(), boxes);
-  return set;
+FrameSet load_circuit(std::size_t limit) { return simulated("circuit", std::nullopt, limit); }
+
+FrameSet load_exact_circuit(std::size_t limit) {
+  return simulated("exact_circuit", SensorModel::perfect(), limit);
 }
 
 std::vector<std::uint32_t> made_up_owners(const Frame& frame) {

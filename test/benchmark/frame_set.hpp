@@ -29,6 +29,8 @@ FrameSet load_redkitchen(std::size_t limit);
 FrameSet load_tabletop(std::size_t limit);
 /// One lap of the TorWIC circuit (640 x 360) through the simulator's stereo camera.
 FrameSet load_circuit(std::size_t limit);
+/// The same with exact depth, labels and poses: what is wrong with a map of it is the mapper's.
+FrameSet load_exact_circuit(std::size_t limit);
 
 /// Which object owns what a frame shows, as a tracker would say: things of half a metre, a third of
 /// them objects, that keep their owner from frame to frame; one entry per 2 x 2 pixels.

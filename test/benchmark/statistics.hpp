@@ -14,8 +14,6 @@ inline double clock_ms(clockid_t clock) {
   clock_gettime(clock, &t);
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
-/// CPU time of the whole process, that is of all threads of a pool.
-inline double cpu_ms() { return clock_ms(CLOCK_PROCESS_CPUTIME_ID); }
 inline double wall_ms() { return clock_ms(CLOCK_MONOTONIC); }
 
 /// The value below which `share` of the values lie; 0 without values.
@@ -54,12 +52,20 @@ inline std::size_t in_turn(std::size_t frame, std::size_t turn) {
   return (frame + (frame / 3 % 2 == 0 ? turn : 2 * turn)) % 3;
 }
 
-/// Times one call of `work`.
+/// Times one call of `work`, which one thread does alone: what other threads of the process do at
+/// the time, looking for work, is not its own.
 template <class Work>
-void time_into(Series& series, std::size_t frame, const Work& work) {
-  const double cpu = cpu_ms(), wall = wall_ms();
+void time_into(Series& series, std::size_t frame, const Work& work,
+               clockid_t clock = CLOCK_THREAD_CPUTIME_ID) {
+  const double cpu = clock_ms(clock), wall = wall_ms();
   work();
-  series.add(frame, cpu_ms() - cpu, wall_ms() - wall);
+  series.add(frame, clock_ms(clock) - cpu, wall_ms() - wall);
+}
+
+/// The same, done by several threads, those of a pool.
+template <class Work>
+void time_all_into(Series& series, std::size_t frame, const Work& work) {
+  time_into(series, frame, work, CLOCK_PROCESS_CPUTIME_ID);
 }
 
 }  // namespace pocd::bench

@@ -35,7 +35,7 @@ Run integrate_all(const FrameSet& set, const TsdfConfig& config, int passes) {
             time_into(run.one, i, [&] { map_1.integrate(input, pool_1); });
             break;
           case 1:
-            time_into(run.two, i, [&] { map_2.integrate(input, pool_2); });
+            time_all_into(run.two, i, [&] { map_2.integrate(input, pool_2); });
             break;
           default:
             time_into(run.opencv, i, [&] { hash.integrate(frame); });
@@ -112,7 +112,7 @@ double possible_speed_up() {
   Series one, two;
   for (int turn = 0; turn < kTurns; ++turn) {
     time_into(one, one.wall().size(), [&] { pool_1.parallel_for(kPieces, 1, piece); });
-    time_into(two, two.wall().size(), [&] { pool_2.parallel_for(kPieces, 1, piece); });
+    time_all_into(two, two.wall().size(), [&] { pool_2.parallel_for(kPieces, 1, piece); });
   }
   return median(one.wall()) / median(two.wall());
 }

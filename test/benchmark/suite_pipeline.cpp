@@ -24,9 +24,14 @@ struct Peers {
   Series hash_tsdf, pcl_2cm, pcl_5cm, points, normals, planes, components;
 };
 
-void process(PocdPipeline& pipeline, const Frame& frame, std::size_t i, Times& times) {
+void process(PocdPipeline& pipeline, int threads, const Frame& frame, std::size_t i, Times& times) {
   FrameResult result;
-  time_into(times.total, i, [&] { result = pipeline.process_frame(frame); });
+  const auto work = [&] { result = pipeline.process_frame(frame); };
+  if (threads == 1) {
+    time_into(times.total, i, work);
+  } else {
+    time_all_into(times.total, i, work);
+  }
   for (const StageTiming& t : result.timings) {
     if (times.stage.find(t.stage) == times.stage.end()) times.order.push_back(t.stage);
     times.stage[t.stage].add(i, t.cpu_ms, t.wall_ms);
@@ -204,10 +209,10 @@ void run_pipeline(const FrameSet& set, const SuiteOptions& options, std::ostream
       for (std::size_t turn = 0; turn < 3; ++turn) {
         switch (in_turn(i, turn)) {
           case 0:
-            process(pipeline_1, frame, i, one);
+            process(pipeline_1, 1, frame, i, one);
             break;
           case 1:
-            process(pipeline_2, frame, i, two);
+            process(pipeline_2, 2, frame, i, two);
             break;
           default:
             if (HashTsdf::available()) {

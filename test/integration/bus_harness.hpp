@@ -58,6 +58,13 @@ inline bool eventually(const std::function<bool()>& condition) {
   return true;
 }
 
+/// How often a process said it.
+inline std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
 inline std::string bin(const std::string& name) { return std::string(POCD_BIN_DIR) + "/" + name; }
 inline std::string source(const std::string& path) {
   return std::string(POCD_SOURCE_DIR) + "/" + path;
@@ -74,12 +81,12 @@ inline std::vector<std::string> node_command(const TestDomain& domain,
   return command;
 }
 
-/// pocd_play of the test's scenario, every frame acknowledged.
+/// pocd_play of a scenario, every frame acknowledged.
 inline std::vector<std::string> play_command(const TestDomain& domain,
-                                             const std::vector<std::string>& more = {}) {
-  std::vector<std::string> command{bin("pocd_play"), "--dataset", "sim",
-                                   "--input",        scenario(),  "--fast",
-                                   "--lossless",     "--domain",  domain.text()};
+                                             const std::vector<std::string>& more = {},
+                                             const std::string& input = scenario()) {
+  std::vector<std::string> command{bin("pocd_play"), "--dataset",  "sim",      "--input",    input,
+                                   "--fast",         "--lossless", "--domain", domain.text()};
   command.insert(command.end(), more.begin(), more.end());
   return command;
 }

@@ -61,7 +61,8 @@ class MapSource {
   }
   void publish(bool now = true) {
     const std::lock_guard<std::mutex> lock(mutex_);  // before anybody can have the new version
-    publication.send_due(map, 1, now);
+    if (publication.begin_step(now)) publication.send_step(publication.make_step(map), 1);
+    publication.send_waiting();
     history_[publication.publisher().version()] = publication.publisher().digest();
   }
   void turn() {

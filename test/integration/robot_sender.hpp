@@ -41,12 +41,13 @@ class RobotSender {
   /// Camera info and a wall 1.5 m away.
   void send_image(StampNs stamp_ns, const std::string& frame = "") {
     const std::string camera = frame.empty() ? camera_frame() : frame;
-    auto info = dds::camera_message({30, 20, 40, 40, 15, 10}, stamp_ns, camera);
+    auto info = dds::camera_message({30, 20, 40 * zoom_, 40 * zoom_, 15, 10}, stamp_ns, camera);
     EXPECT_TRUE(info_.write(info));
     auto depth =
         dds::image_message(cv::Mat(20, 30, CV_16UC1, cv::Scalar(1500)), "16UC1", stamp_ns, camera);
     EXPECT_TRUE(depth_.write(depth));
   }
+  void zoom(double factor) { zoom_ *= factor; }
   void send_labels(StampNs stamp_ns) {
     auto labels =
         dds::image_message(cv::Mat(20, 30, CV_8UC1, cv::Scalar(0)), "mono8", stamp_ns, "");
@@ -65,6 +66,7 @@ class RobotSender {
 
  private:
   std::string name_;
+  double zoom_ = 1.0;
   dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info_;
   dds::Writer<nav_msgs::msg::OdometryPubSubType> odometry_;
   std::unique_ptr<dds::Writer<sensor_msgs::msg::ImagePubSubType>> labels_;

@@ -6,8 +6,9 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/common/random.hpp"
-#include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/bridge/image_visit.hpp"
+#include "pocd_dds/bridge/map_messages.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "sensor_msgsPubSubTypes.h"
 
 namespace pocd::dds {
@@ -292,7 +293,10 @@ TEST(DeltaMessages, PartsCarryTheWholeStepAndDamageIsNoticed) {
     delta.changed.push_back({{i, 0, -i}, 4, std::vector<std::uint8_t>(100 + i, 3)});
   }
   delta.removed = {{7, 7, 7}};
-  auto parts = delta_messages(delta, 0, 5, 250);
+  std::vector<pocd_msgs::msg::MapDelta> parts;
+  for (DeltaParts wanted = delta_parts(delta, 0, 5, 250); wanted.left() > 0;) {
+    parts.push_back(wanted.next());
+  }
   ASSERT_EQ(parts.size(), 5u);  // two payloads of about 100 bytes fit into 250
   const auto whole = delta_from(parts);
   ASSERT_TRUE(whole);

@@ -3,7 +3,7 @@
 
 #include "lossy_link.hpp"
 #include "map_source.hpp"
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 
 namespace pocd {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "map_source.hpp"
 #include "pocd/map/map_replica.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/map_mirror.hpp"
 
 namespace pocd {

@@ -5,7 +5,7 @@
 #include <mutex>
 
 #include "bus_harness.hpp"
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/map_mirror.hpp"
 #include "pocd_dds/object_watch.hpp"

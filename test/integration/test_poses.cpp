@@ -1,7 +1,7 @@
 // The ways in which fleets say where a robot is, as real messages, and what is said about bad ones.
 #include <gtest/gtest.h>
 
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/map_messages.hpp"
 #include "robot_sender.hpp"
 
 namespace pocd {

@@ -5,7 +5,7 @@
 
 #include "map_source.hpp"
 #include "nav_msgsPubSubTypes.h"
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/map_mirror.hpp"
 
 namespace pocd {

@@ -43,6 +43,18 @@ inline std::string play_and_end(Process& node, const std::vector<std::string>& p
   return ended.err;
 }
 
+/// The same, with a mirror beside it that has to end with the map of the offline run.
+inline std::string play_and_compare(const TestDomain& domain, Process& node,
+                                    const std::vector<std::string>& play,
+                                    const RunSummary& offline) {
+  Process mirror({bin("pocd_mirror"), "--until-end", "--domain", domain.text()});
+  const std::string said = play_and_end(node, play);
+  const CommandResult mirrored = mirror.wait();
+  EXPECT_NE(mirrored.out.find("digest " + offline.map_digest), std::string::npos)
+      << mirrored.out << mirrored.err << "offline " << offline.map_digest;
+  return said;
+}
+
 /// Takes samples as they come, from a thread of its own, like a tool does. (Who reads at the end
 /// only finds a dispose in the place of the state before it: topics keep the last sample.)
 class Taker {

@@ -7,22 +7,12 @@
 #include <sstream>
 
 #include "peer_log.hpp"
-#include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
+#include "udp_profiles.hpp"
 #include "whole_run.hpp"
 
 namespace pocd {
 namespace {
-
-constexpr const char* kUdpOnly = R"(<?xml version="1.0" encoding="UTF-8" ?>
-<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
-  <transport_descriptors><transport_descriptor>
-    <transport_id>udp</transport_id><type>UDPv4</type>
-    <sendBufferSize>4194304</sendBufferSize><receiveBufferSize>4194304</receiveBufferSize>
-  </transport_descriptor></transport_descriptors>
-  <participant profile_name="udp" is_default_profile="true"><rtps>
-    <userTransports><transport_id>udp</transport_id></userTransports>
-    <useBuiltinTransports>false</useBuiltinTransports>
-  </rtps></participant></profiles></dds>)";
 
 std::string small_drives() { return source("test/peers/small_drives.yaml"); }
 

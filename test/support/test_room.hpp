@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "look_from.hpp"
 #include "pocd/common/random.hpp"
 #include "pocd/input/depth_noise.hpp"
 #include "pocd/input/frame.hpp"
@@ -49,17 +50,6 @@ inline PipelineConfig room_config() {
 }
 
 inline CameraModel room_camera() { return {320, 240, 260.0, 260.0, 159.5, 119.5}; }
-
-/// Camera at `eye_W` looking along +y of the map, turned left by yaw and pitched down [rad].
-inline Pose look_from(const Eigen::Vector3d& eye_W, double yaw_rad = 0.0, double pitch_rad = 0.3) {
-  Eigen::Matrix3d R_level;  // columns: optical x, y, z in the map frame
-  R_level << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  Pose T_W_C = Pose::Identity();
-  T_W_C.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) * R_level *
-                   Eigen::AngleAxisd(-pitch_rad, Eigen::Vector3d::UnitX());
-  T_W_C.translation() = eye_W;
-  return T_W_C;
-}
 
 /// A box that stands at height `z_m` with its middle at (x, y).
 inline SceneObject solid(ClassId class_id, const Eigen::Vector2d& middle_W,

@@ -2,6 +2,7 @@
 #include <set>
 
 #include "image_file.hpp"
+#include "listed_reader.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
 #include "text_file.hpp"
@@ -36,30 +37,15 @@ CameraModel read_intrinsics(const fs::path& file) {
   return camera;
 }
 
-class RgbdReader : public DatasetReader {
+class RgbdReader : public ListedReader<Entry> {
  public:
-  explicit RgbdReader(const DatasetOptions& options)
-      : period_ns_(std::llround(1e9 / options.frame_rate_hz)) {
+  explicit RgbdReader(const DatasetOptions& options) : ListedReader(options.frame_rate_hz) {
     for (const fs::path& path : options.inputs) {
       require_folder(path);
       folders_.push_back({path, read_intrinsics(path / "camera-intrinsics.txt"),
                           read_levelling(path, options.gravity_W)});
       list(folders_.size() - 1);
     }
-  }
-
-  std::size_t size() const override { return entries_.size(); }
-
-  std::optional<Frame> next() override {
-    while (next_ < entries_.size()) {
-      const std::size_t index = next_++;
-      try {
-        return read(index);
-      } catch (const InputError& error) {
-        skip(error.what());
-      }
-    }
-    return std::nullopt;
   }
 
  private:
@@ -84,7 +70,7 @@ class RgbdReader : public DatasetReader {
     }
   }
 
-  Frame read(std::size_t index) {
+  Frame read(std::size_t index) override {
     const Entry& entry = entries_[index];
     Folder& folder = folders_[entry.folder];
     const auto missing = [&](const char* what, const fs::path& present) {
@@ -105,17 +91,13 @@ class RgbdReader : public DatasetReader {
     CameraModel camera = folder.camera;
     if (camera.width == 0) camera.width = depth.cols, camera.height = depth.rows;
     const Pose T_level_C = folder.R_level_W * T_W_C;
-    Frame frame = make_frame(static_cast<StampNs>(index) * period_ns_, camera, T_level_C, depth,
-                             cv::Mat(), color, entry.depth.string());
+    Frame frame = make_frame(stamp_ns(index), camera, T_level_C, depth, cv::Mat(), color,
+                             entry.depth.string());
     folder.camera = camera;
-    frame.sequence = index;
     return frame;
   }
 
-  StampNs period_ns_;
   std::vector<Folder> folders_;
-  std::vector<Entry> entries_;
-  std::size_t next_ = 0;
 };
 
 }  // namespace

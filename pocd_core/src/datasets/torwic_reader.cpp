@@ -3,6 +3,7 @@
 #include <set>
 
 #include "image_file.hpp"
+#include "listed_reader.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
 #include "pocd/sim/scenario.hpp"
@@ -51,12 +52,12 @@ std::optional<int> leading_index(const std::string& text) {
   return number;
 }
 
-class TorwicReader : public DatasetReader {
+class TorwicReader : public ListedReader<Entry> {
  public:
   explicit TorwicReader(const DatasetOptions& options)
-      : camera_(options.camera.value_or(torwic_camera())),
-        extrinsics_(options.extrinsics.value_or(torwic_extrinsics())),
-        period_ns_(std::llround(1e9 / options.frame_rate_hz)) {
+      : ListedReader(options.frame_rate_hz),
+        camera_(options.camera.value_or(torwic_camera())),
+        extrinsics_(options.extrinsics.value_or(torwic_extrinsics())) {
     validate(camera_, "torwic camera");
     validate_pose(extrinsics_.T_B_C, "torwic camera mount");
     for (const fs::path& folder : options.inputs) {
@@ -67,18 +68,6 @@ class TorwicReader : public DatasetReader {
 
   std::size_t size() const override { return entries_.size() + lines_without_frame_; }
   CameraExtrinsics extrinsics() const override { return extrinsics_; }
-
-  std::optional<Frame> next() override {
-    while (next_ < entries_.size()) {
-      const std::size_t index = next_++;
-      try {
-        return read(index);
-      } catch (const InputError& error) {
-        skip(error.what());
-      }
-    }
-    return std::nullopt;
-  }
 
  private:
   std::vector<Entry> list(const fs::path& folder) {
@@ -156,25 +145,20 @@ class TorwicReader : public DatasetReader {
     }
   }
 
-  Frame read(std::size_t index) {
+  Frame read(std::size_t index) override {
     const Entry& entry = entries_[index];
     if (!entry.problem.empty()) throw InputError(entry.problem);
     const cv::Mat depth = read_depth_image(entry.depth);
     const cv::Mat labels = entry.labels.empty() ? cv::Mat() : read_label_image(entry.labels);
     const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
-    Frame frame = make_frame(entry.stamp_ns, camera_, entry.T_W_B * extrinsics_.T_B_C, depth,
-                             labels, color, entry.depth.string());
-    frame.sequence = index;
-    return frame;
+    return make_frame(entry.stamp_ns, camera_, entry.T_W_B * extrinsics_.T_B_C, depth, labels,
+                      color, entry.depth.string());
   }
 
   CameraModel camera_;
   CameraExtrinsics extrinsics_;
-  StampNs period_ns_;
-  std::vector<Entry> entries_;
   std::size_t lines_without_frame_ = 0;
   StampNs last_stamp_ns_ = 0;
-  std::size_t next_ = 0;
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "image_file.hpp"
+#include "listed_reader.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
 #include "text_file.hpp"
@@ -56,10 +57,9 @@ fs::path depth_folder(const fs::path& path) {
   throw InputError(path.string() + ": has no folder depth_noise, depth_original or depth");
 }
 
-class ToycarReader : public DatasetReader {
+class ToycarReader : public ListedReader<Entry> {
  public:
-  explicit ToycarReader(const DatasetOptions& options)
-      : period_ns_(std::llround(1e9 / options.frame_rate_hz)) {
+  explicit ToycarReader(const DatasetOptions& options) : ListedReader(options.frame_rate_hz) {
     for (const fs::path& path : options.inputs) {
       require_folder(path);
       folders_.push_back(
@@ -67,20 +67,6 @@ class ToycarReader : public DatasetReader {
            read_levelling(path, options.gravity_W)});
       list(path);
     }
-  }
-
-  std::size_t size() const override { return entries_.size(); }
-
-  std::optional<Frame> next() override {
-    while (next_ < entries_.size()) {
-      const std::size_t index = next_++;
-      try {
-        return read(index);
-      } catch (const InputError& error) {
-        skip(error.what());
-      }
-    }
-    return std::nullopt;
   }
 
  private:
@@ -137,7 +123,7 @@ class ToycarReader : public DatasetReader {
     }
   }
 
-  Frame read(std::size_t index) {
+  Frame read(std::size_t index) override {
     const Entry& entry = entries_[index];
     if (!entry.problem.empty()) throw InputError(entry.problem);
     const Folder& folder = folders_[entry.folder];
@@ -145,17 +131,11 @@ class ToycarReader : public DatasetReader {
                                                             : read_depth_image(entry.depth);
     const cv::Mat labels = entry.labels.empty() ? cv::Mat() : read_id_image(entry.labels);
     const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
-    Frame frame =
-        make_frame(static_cast<StampNs>(index) * period_ns_, folder.camera,
-                   folder.R_level_W * entry.T_W_C, depth, labels, color, entry.depth.string());
-    frame.sequence = index;
-    return frame;
+    return make_frame(stamp_ns(index), folder.camera, folder.R_level_W * entry.T_W_C, depth, labels,
+                      color, entry.depth.string());
   }
 
-  StampNs period_ns_;
   std::vector<Folder> folders_;
-  std::vector<Entry> entries_;
-  std::size_t next_ = 0;
 };
 
 }  // namespace

@@ -46,6 +46,10 @@ const char* to_string(InputReason reason) {
       return "no_pose";
     case InputReason::kSilentStream:
       return "silent_stream";
+    case InputReason::kIncompatibleQos:
+      return "incompatible_qos";
+    case InputReason::kCameraChanged:
+      return "camera_changed";
   }
   return "";
 }

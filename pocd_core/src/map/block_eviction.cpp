@@ -108,17 +108,8 @@ bool BlockStore::evict_oldest() {
     return false;
   }
   for (const std::uint32_t slot : region.memory->members) {
-    Meta& m = meta(slot);
-    for (const std::uint32_t owner : m.owners) {
-      const auto entry = owner_slots_.find(owner);
-      std::vector<std::uint32_t>& slots = entry->second;
-      *std::find(slots.begin(), slots.end(), slot) = slots.back();
-      slots.pop_back();
-      if (slots.empty()) owner_slots_.erase(entry);
-    }
-    owner_entries_ -= m.owners.size();
-    m.owners.clear();
-    m.used = false;
+    forget_owners(slot);
+    meta(slot).used = false;
   }
   for_each_owner(raw, [&](std::uint32_t owner) {
     owner_regions_on_disk_[owner].push_back(region.key);

@@ -139,10 +139,8 @@ void BlockStore::erase(Region& region) {
   regions_.erase(BlockKey(region.key));
 }
 
-void BlockStore::drop(std::uint32_t slot) {
+void BlockStore::forget_owners(std::uint32_t slot) {
   Meta& m = meta(slot);
-  POCD_CHECK(m.used);
-  if (m.dirty_list != 0) mark_dirty(slot);
   for (const std::uint32_t owner : m.owners) {
     const auto entry = owner_slots_.find(owner);
     std::vector<std::uint32_t>& slots = entry->second;
@@ -152,6 +150,13 @@ void BlockStore::drop(std::uint32_t slot) {
   }
   owner_entries_ -= m.owners.size();
   m.owners.clear();
+}
+
+void BlockStore::drop(std::uint32_t slot) {
+  Meta& m = meta(slot);
+  POCD_CHECK(m.used);
+  if (m.dirty_list != 0) mark_dirty(slot);
+  forget_owners(slot);
   m.used = false;
 
   Region& r = region_of_slot(slot);

@@ -125,6 +125,7 @@ class BlockStore {
   std::uint32_t allocate(Region& region, const BlockKey& key);
   void add_chunk(Region& region);
   void release_memory(Region& region);
+  void forget_owners(std::uint32_t slot);
   void erase(Region& region);
 
   // block_eviction.cpp

@@ -79,10 +79,17 @@ double MapPublisher::area_m2() const {
 }
 
 std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
+  std::optional<MapDelta> step = make_step(map);
+  if (step) take_over(*step);
+  return step;
+}
+
+std::optional<MapDelta> MapPublisher::make_step(TsdfMap& map) const {
   MapDelta delta;
   delta.epoch = epoch_;
   delta.base_version = version_;
   delta.version = version_ + 1;
+  delta.digest = digest_;
   MapReader reader(map);
   const auto payload_of = [&](const TileKey& key) {
     try {
@@ -95,33 +102,42 @@ std::optional<MapDelta> MapPublisher::update(TsdfMap& map) {
   for (const TileKey& key : tiles_of(map.take_dirty())) {
     std::vector<std::uint8_t> payload = payload_of(key);
     const auto known = tiles_.find(key);
-    if (known == tiles_.end() ? payload.empty() : known->second.payload == payload) continue;
-    if (known != tiles_.end()) {
-      subtract(digest_, tile_digest(key, known->second.payload));
-      bytes_ -= known->second.payload.size();
-    } else {
-      ++columns_[{key.x, key.y}];
+    if (known == tiles_.end() ? payload.empty() : known->second.payload.bytes() == payload) {
+      continue;
     }
+    if (known != tiles_.end()) subtract(delta.digest, tile_digest(key, known->second.payload));
     if (payload.empty()) {
-      tiles_.erase(known);
-      const auto column = columns_.find({key.x, key.y});
-      if (--column->second == 0) columns_.erase(column);
       delta.removed.push_back(key);
       continue;
     }
-    add(digest_, tile_digest(key, payload));
-    bytes_ += payload.size();
-    MapTile tile{key, delta.version, std::move(payload)};
-    delta.changed.push_back(tile);
-    tiles_[key] = std::move(tile);
+    add(delta.digest, tile_digest(key, payload));
+    delta.changed.push_back({key, delta.version, std::move(payload)});
   }
   if (delta.changed.empty() && delta.removed.empty()) return std::nullopt;
   std::sort(delta.changed.begin(), delta.changed.end(),
             [](const MapTile& a, const MapTile& b) { return a.key < b.key; });
   std::sort(delta.removed.begin(), delta.removed.end());
-  version_ = delta.version;
-  delta.digest = digest_;
   return delta;
+}
+
+void MapPublisher::take_over(const MapDelta& step) {
+  POCD_CHECK(step.epoch == epoch_ && step.base_version == version_);
+  for (const TileKey& key : step.removed) {
+    const auto known = tiles_.find(key);
+    bytes_ -= known->second.payload.size();
+    tiles_.erase(known);
+    const auto column = columns_.find({key.x, key.y});
+    if (--column->second == 0) columns_.erase(column);
+  }
+  for (const MapTile& tile : step.changed) {
+    const auto [held, is_new] = tiles_.try_emplace(tile.key);
+    if (is_new) ++columns_[{tile.key.x, tile.key.y}];
+    bytes_ += tile.payload.size();
+    bytes_ -= held->second.payload.size();
+    held->second = tile;
+  }
+  version_ = step.version;
+  digest_ = step.digest;
 }
 
 }  // namespace pocd

@@ -12,12 +12,15 @@ std::vector<std::uint8_t> compress(const std::vector<std::uint8_t>& raw, int lev
   // A context costs more than a tile: one per thread is kept.
   thread_local const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
                                                                                   &ZSTD_freeCCtx);
-  std::vector<std::uint8_t> out(ZSTD_compressBound(raw.size()));
+  // So is the room for the worst case: what is returned has only the bytes it needs, because many
+  // thousands of it are held.
+  thread_local std::vector<std::uint8_t> room;
+  const std::size_t bound = ZSTD_compressBound(raw.size());
+  if (room.size() < bound) room.resize(bound);
   const std::size_t size =
-      ZSTD_compressCCtx(context.get(), out.data(), out.size(), raw.data(), raw.size(), level);
+      ZSTD_compressCCtx(context.get(), room.data(), room.size(), raw.data(), raw.size(), level);
   POCD_CHECK(!ZSTD_isError(size));
-  out.resize(size);
-  return out;
+  return {room.data(), room.data() + size};
 }
 
 std::vector<std::uint8_t> decompress(const std::uint8_t* data, std::size_t size, std::size_t limit,

@@ -37,6 +37,15 @@ inline std::vector<Frame> read_all(DatasetReader& reader) {
   return frames;
 }
 
+inline DatasetOptions dataset_options(const std::string& format,
+                                      const std::filesystem::path& folder, double frame_rate_hz) {
+  DatasetOptions options;
+  options.format = format;
+  options.inputs = {folder};
+  options.frame_rate_hz = frame_rate_hz;
+  return options;
+}
+
 /// What open_dataset complains about, "" for nothing.
 inline std::string open_error(const DatasetOptions& options) {
   try {

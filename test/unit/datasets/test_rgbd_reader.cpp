@@ -26,11 +26,7 @@ void make_sequence(const ScratchFolder& folder, int count) {
 }
 
 DatasetOptions options_for(const ScratchFolder& folder) {
-  DatasetOptions options;
-  options.format = "rgbd";
-  options.inputs = {folder.path()};
-  options.frame_rate_hz = 10.0;
-  return options;
+  return dataset_options("rgbd", folder.path(), 10.0);
 }
 
 TEST(RgbdReader, ReadsFrames) {

@@ -32,11 +32,8 @@ void make_sequence(const ScratchFolder& folder) {
 }
 
 DatasetOptions options_for(const ScratchFolder& folder) {
-  DatasetOptions options;
-  options.format = "torwic";
-  options.inputs = {folder.path()};
+  DatasetOptions options = dataset_options("torwic", folder.path(), 15.0);
   options.camera = kSmall;
-  options.frame_rate_hz = 15.0;
   return options;
 }
 

@@ -38,11 +38,7 @@ void make_sequence(const ScratchFolder& folder, const char* depth = "depth_noise
 }
 
 DatasetOptions options_for(const ScratchFolder& folder) {
-  DatasetOptions options;
-  options.format = "toycar";
-  options.inputs = {folder.path()};
-  options.frame_rate_hz = 10.0;
-  return options;
+  return dataset_options("toycar", folder.path(), 10.0);
 }
 
 TEST(ToycarReader, ReadsFrames) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "look_from.hpp"
 #include "pocd/common/random.hpp"
 #include "pocd/map/tsdf_map.hpp"
 
@@ -26,13 +27,7 @@ inline CameraModel small_camera() { return {160, 120, 140.0, 140.0, 79.5, 59.5};
 
 /// Camera at p looking along +y of the map, turned by yaw and pitched down [rad].
 inline Pose camera_pose(const Eigen::Vector3d& p, double yaw_rad, double pitch_rad) {
-  Eigen::Matrix3d R_level;  // columns: optical x, y, z in the map frame
-  R_level << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  Pose T_W_C = Pose::Identity();
-  T_W_C.linear() = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) * R_level *
-                   Eigen::AngleAxisd(-pitch_rad, Eigen::Vector3d::UnitX());
-  T_W_C.translation() = p;
-  return T_W_C;
+  return test::look_from(p, yaw_rad, pitch_rad);
 }
 
 struct View {

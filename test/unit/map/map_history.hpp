@@ -14,10 +14,17 @@ inline MapTile random_tile(Random& random, std::uint64_t version) {
   MapTile tile;
   tile.key = {c(), c(), c()};
   tile.version = version;
-  for (std::uint64_t n = 1 + random.below(20); n-- > 0;) {
-    tile.payload.push_back(static_cast<std::uint8_t>(random.next()));
-  }
+  std::vector<std::uint8_t> payload(1 + random.below(20));
+  for (std::uint8_t& byte : payload) byte = static_cast<std::uint8_t>(random.next());
+  tile.payload = std::move(payload);
   return tile;
+}
+
+/// As if it had been damaged on the way.
+inline void lengthen(MapTile& tile) {
+  std::vector<std::uint8_t> payload = tile.payload.bytes();
+  payload.push_back(1);
+  tile.payload = std::move(payload);
 }
 
 using Contents = std::map<TileKey, std::vector<std::uint8_t>>;
@@ -25,7 +32,7 @@ using Contents = std::map<TileKey, std::vector<std::uint8_t>>;
 template <class Tiles>
 Contents contents(const Tiles& tiles) {
   Contents out;
-  for (const auto& [key, tile] : tiles) out[key] = tile.payload;
+  for (const auto& [key, tile] : tiles) out[key] = tile.payload.bytes();
   return out;
 }
 

@@ -148,7 +148,7 @@ class LossyRun {
   void send_step() {
     const MapDelta& delta = sender_.history.deltas[version_ - 1];
     MapDelta sent = delta;
-    if (random_.uniform() < 0.02 && !sent.changed.empty()) sent.changed[0].payload.push_back(1);
+    if (random_.uniform() < 0.02 && !sent.changed.empty()) lengthen(sent.changed[0]);
     channel_.send([this, sent] {
       hear(sent.version);
       follower_.delta(sent);

@@ -72,7 +72,9 @@ TEST(MapReplica, DamagedContentIsNoticed) {
   const History h(random, 1, 4);
   MapReplica replica;
   MapDelta damaged = h.deltas[0];
-  damaged.changed[0].payload[0] = static_cast<std::uint8_t>(damaged.changed[0].payload[0] ^ 1);
+  std::vector<std::uint8_t> payload = damaged.changed[0].payload.bytes();
+  payload[0] = static_cast<std::uint8_t>(payload[0] ^ 1);
+  damaged.changed[0].payload = payload;
   EXPECT_EQ(replica.apply(damaged), DeltaOutcome::kCorrupt);
   EXPECT_EQ(replica.stale_because(), "the digest of version 1 does not fit");
   EXPECT_EQ(replica.apply(h.deltas[1]), DeltaOutcome::kCorrupt);
@@ -100,7 +102,7 @@ TEST(MapReplica, NeverCallsAWrongMapRight) {
         sent.push_back(delta);
         if (random.uniform() < 0.2) sent.push_back(delta);
         if (random.uniform() < 0.02 && !sent.back().changed.empty()) {
-          sent.back().changed[0].payload.push_back(1);
+          lengthen(sent.back().changed[0]);
         }
       }
       for (std::size_t i = 0; i + 1 < sent.size(); ++i) {

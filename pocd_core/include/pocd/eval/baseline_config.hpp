@@ -6,17 +6,23 @@
 
 namespace pocd {
 
-struct StaticTsdfConfig {
-  double max_weight = 5.0;
-  double min_weight = 0.5;
+/// Of a signed distance map.
+struct VoxelWeights {
+  double max_weight;
+  double min_weight;
 
   template <class Visitor>
   void describe(Visitor& visit) {
     visit("max_weight", max_weight, Range{0.1, 1e6},
-          "Cap of a voxel's weight [observations at 1 m]; 10000, in effect none, is Voxblox's.");
+          "Cap of a voxel's weight [observations at 1 m].");
     visit("min_weight", min_weight, Range{0.0, 1e6},
           "Weight at which a voxel counts as observed [observations at 1 m].");
   }
+};
+
+/// Voxblox's cap is 10000, in effect none.
+struct StaticTsdfConfig : VoxelWeights {
+  StaticTsdfConfig() : VoxelWeights{5.0, 0.5} {}
 };
 
 struct VoxelCorrectionConfig {
@@ -34,9 +40,10 @@ struct VoxelCorrectionConfig {
   }
 };
 
-struct TrackedObjectsConfig {
-  double max_weight = 200.0;
-  double min_weight = 1.0;
+/// The weights are those of the static map.
+struct TrackedObjectsConfig : VoxelWeights {
+  TrackedObjectsConfig() : VoxelWeights{200.0, 1.0} {}
+
   int lost_after_frames = 150;
   bool keep_lost = false;
   int min_hits = 4;
@@ -44,10 +51,7 @@ struct TrackedObjectsConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("max_weight", max_weight, Range{0.1, 1e6},
-          "Cap of a voxel's weight in the static map [observations at 1 m].");
-    visit("min_weight", min_weight, Range{0.0, 1e6},
-          "Weight at which a voxel of the static map counts as observed [observations at 1 m].");
+    VoxelWeights::describe(visit);
     visit("lost_after_frames", lost_after_frames, Range{1, 1000000},
           "A model that is not found for this many frames is lost [frames]; MaskFusion: 10.");
     visit("keep_lost", keep_lost, "A lost model stays where it was seen last, not given up.");
@@ -58,9 +62,9 @@ struct TrackedObjectsConfig {
   }
 };
 
-struct SubmapsConfig {
-  double max_weight = 15.0;
-  double min_weight = 0.2;
+struct SubmapsConfig : VoxelWeights {
+  SubmapsConfig() : VoxelWeights{15.0, 0.2} {}
+
   int inactive_after_frames = 5;
   int confirm_frames = 2;
   double same_thing_share = 0.3;
@@ -71,10 +75,7 @@ struct SubmapsConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("max_weight", max_weight, Range{0.1, 1e6},
-          "Cap of a voxel's weight [observations at 1 m].");
-    visit("min_weight", min_weight, Range{0.0, 1e6},
-          "Weight at which a voxel counts as observed [observations at 1 m].");
+    VoxelWeights::describe(visit);
     visit("inactive_after_frames", inactive_after_frames, Range{1, 1000000},
           "A submap that is not observed for this many frames is frozen [frames].");
     visit("confirm_frames", confirm_frames, Range{1, 1000},

@@ -29,6 +29,8 @@ enum class InputReason {
   kTransformLoop,
   kNoPose,
   kSilentStream,
+  kIncompatibleQos,
+  kCameraChanged,
 };
 const char* to_string(InputReason reason);  ///< "unknown_encoding", ...
 

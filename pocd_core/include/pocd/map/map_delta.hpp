@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -27,12 +28,39 @@ struct MapDigest {
   std::string hex() const;  ///< 32 lower-case digits
 };
 
+/// Bytes that do not change any more: copies share them, across threads, too.
+class TilePayload {
+ public:
+  using Bytes = std::vector<std::uint8_t>;
+
+  TilePayload() = default;
+  TilePayload(Bytes bytes)  // NOLINT(google-explicit-constructor): the same thing, kept otherwise
+      : bytes_(std::make_shared<const Bytes>(std::move(bytes))) {}
+
+  const Bytes& bytes() const { return bytes_ ? *bytes_ : none(); }
+  operator const Bytes&() const { return bytes(); }  // NOLINT(google-explicit-constructor)
+  std::size_t size() const { return bytes().size(); }
+  bool empty() const { return bytes().empty(); }
+
+  friend bool operator==(const TilePayload& a, const TilePayload& b) {
+    return a.bytes_ == b.bytes_ || a.bytes() == b.bytes();
+  }
+  friend bool operator!=(const TilePayload& a, const TilePayload& b) { return !(a == b); }
+
+ private:
+  static const Bytes& none() {
+    static const Bytes empty;
+    return empty;
+  }
+  std::shared_ptr<const Bytes> bytes_;
+};
+
 /// One published tile. payload: zstd frame of the quantised voxels; the layout is documented in
 /// docs/tile_format.md and checked by decode_tile.
 struct MapTile {
   TileKey key;
   std::uint64_t version = 0;  ///< map version at which the tile last changed
-  std::vector<std::uint8_t> payload;
+  TilePayload payload;
 };
 
 /// Decoded tile: 16^3 voxels, x fastest. distance_m within +-truncation, error at most
@@ -67,6 +95,11 @@ class MapPublisher {
 
   /// Consumes map.take_dirty(). Nothing if no published voxel changed. Versions go 0, 1, 2, ...
   std::optional<MapDelta> update(TsdfMap& map);
+  /// The two halves of update(), for those who share the publisher with other threads: the step is
+  /// made while others read, and only taken over while they wait. Every step that is made has to be
+  /// taken over before the next one.
+  std::optional<MapDelta> make_step(TsdfMap& map) const;
+  void take_over(const MapDelta& step);
 
   std::uint64_t epoch() const { return epoch_; }
   std::uint64_t version() const { return version_; }

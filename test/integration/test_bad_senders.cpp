@@ -1,0 +1,56 @@
+// Senders that are on the bus and yet cannot be used: the node names each once, counts it, goes on.
+#include <gtest/gtest.h>
+
+#include "robot_sender.hpp"
+
+namespace pocd {
+namespace {
+
+TEST(BadSenders, AreNamedOnceAndCounted) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain), other_bus = test_participant(domain);
+  HealthWatch health(bus);
+  // Of a participant of their own, because one cannot have two types of a topic.
+  dds::Writer<nav_msgs::msg::OdometryPubSubType> wrong_type(
+      other_bus, dds::topics::kOdometry, "rt/robot1/depth/camera_info", kTestDelivery);
+  dds::Writer<nav_msgs::msg::OdometryPubSubType> wrong_tf(other_bus, dds::topics::kOdometry,
+                                                          "rt/tf", kTestDelivery);
+  dds::Writer<sensor_msgs::msg::ImagePubSubType> best_effort(
+      bus, dds::topics::kSegmentation, "rt/robot1/segmentation", dds::topics::best_effort(5));
+  RobotSender robot(bus, "robot1");
+  Process node(node_command(domain, {"--lossless"}));  // asks for reliable delivery
+  ASSERT_TRUE(eventually([&] { return health.newest() != nullptr && robot.matched(); }));
+  const std::string info = "rt/robot1/depth/camera_info";
+  EXPECT_TRUE(eventually([&] { return health.problem(info, "wrong_type") == 1; }));
+  EXPECT_TRUE(eventually([&] { return health.problem("rt/tf", "wrong_type") == 1; }));
+  EXPECT_TRUE(eventually(
+      [&] { return health.problem("rt/robot1/segmentation", "incompatible_qos") == 1; }));
+
+  robot.send_frame(33'000'000);
+  robot.send_frame(66'000'000);
+  EXPECT_EQ(health.problem(info, "camera_changed"), 0u);
+  robot.zoom(1.25);
+  robot.send_frame(99'000'000);
+  robot.send_frame(132'000'000);
+  EXPECT_TRUE(eventually([&] { return health.problem(info, "camera_changed") == 1; }));
+
+  node.signal(SIGTERM);
+  const CommandResult result = node.wait();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("4 frames processed"), std::string::npos) << result.err;
+  EXPECT_EQ(count_of(result.err, info + ": wrong_type: announced with type "
+                                        "nav_msgs::msg::dds_::Odometry_, expected "
+                                        "sensor_msgs::msg::dds_::CameraInfo_"),
+            1u)
+      << result.err;
+  EXPECT_EQ(count_of(result.err, "rt/robot1/segmentation: a writer does not offer the reliability"),
+            1u)
+      << result.err;
+  EXPECT_EQ(count_of(result.err, info + ": camera_changed: 30 x 20, fx 40, fy 40, cx 15, cy 10 "
+                                        "became 30 x 20, fx 50, fy 50, cx 15, cy 10"),
+            1u)
+      << result.err;
+}
+
+}  // namespace
+}  // namespace pocd
