@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/natural_order.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
 
@@ -18,10 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 /// "1-10" after "1-9": numbers in names compare as numbers.
-bool natural_less(const std::string& a, const std::string& b) {
-  return a.size() != b.size() ? a.size() < b.size() : a < b;
-}
-
 DatasetOptions recordings(const std::string& format, const std::vector<fs::path>& inputs) {
   DatasetOptions dataset;
   dataset.format = format;

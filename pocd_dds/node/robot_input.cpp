@@ -132,17 +132,19 @@ void RobotInput::drain_camera_info() {
     const Checked<CameraModel> camera = camera_from(info);
     if (camera.problem) {
       problems_.count(camera_info_.topic(), *camera.problem);
-    } else if (!synchronizer_.add_camera_info(to_stamp(info.header().stamp()), *camera.value)) {
-      problems_.count(camera_info_.topic(), backwards(to_stamp(info.header().stamp())));
-    } else {
-      if (camera_ && *camera_ != *camera.value) {
-        problems_.count(
-            camera_info_.topic(),
-            {InputReason::kCameraChanged, text_of(*camera_) + " became " + text_of(*camera.value) +
-                                              ", which is used from here on"});
-      }
-      camera_ = camera.value;
+      continue;
     }
+    const auto problem =
+        synchronizer_.add_camera_info(to_stamp(info.header().stamp()), *camera.value);
+    if (problem) problems_.count(camera_info_.topic(), *problem);
+    if (problem && problem->reason != InputReason::kStampsRestarted) continue;
+    if (camera_ && *camera_ != *camera.value) {
+      problems_.count(
+          camera_info_.topic(),
+          {InputReason::kCameraChanged, text_of(*camera_) + " became " + text_of(*camera.value) +
+                                            ", which is used from here on"});
+    }
+    camera_ = camera.value;
   }
 }
 
@@ -162,9 +164,7 @@ void RobotInput::drain_poses() {
     const StampedTransform& T = *pose.value;
     const auto problem = transforms_.add(T.parent, T.child, T.stamp_ns, T.T);
     if (problem) problems_.count(odometry_.topic(), *problem);
-    if (!problem || problem->reason != InputReason::kStampBackwards) {
-      synchronizer_.pose_seen(T.stamp_ns);
-    }
+    synchronizer_.pose_seen(T.stamp_ns, problem);
   }
 }
 
@@ -220,10 +220,9 @@ void RobotInput::add_image(Stream stream, ConvertedImage&& converted, std::int64
   color_delivers_ = color_delivers_ || stream == Stream::kColor;
   const recording::RosHeader& header = converted.header;
   if (stream == Stream::kDepth && !accept_camera_frame(header.frame_id, topic)) return;
-  if (!synchronizer_.add_image(stream, header.stamp_ns, std::move(converted.image))) {
-    problems_.count(topic, backwards(header.stamp_ns));
-    return;
-  }
+  const auto problem = synchronizer_.add_image(stream, header.stamp_ns, std::move(converted.image));
+  if (problem) problems_.count(topic, *problem);
+  if (stamp_refused(problem)) return;
   latency_.received(robot_.name, header.stamp_ns, received_ns);
 }
 
@@ -295,11 +294,6 @@ std::string RobotInput::waiting_for() const {
   return synchronizer_.waiting_for();
 }
 
-InputProblem RobotInput::backwards(StampNs stamp_ns) {
-  return {InputReason::kStampBackwards,
-          "stamp " + std::to_string(stamp_ns) + " ns is not after the one before"};
-}
-
 std::vector<Frame> RobotInput::take(bool last_call) {
   // An optional stream is worth an endless wait only once it has delivered: an announced topic may
   // stay silent.
@@ -355,7 +349,7 @@ std::optional<std::vector<std::string>> RobotInput::settle_departure() {
 std::uint64_t RobotInput::dropped() const {
   const SynchronizerCounts& counts = synchronizer_.counts();
   return counts.dropped_no_segmentation + counts.dropped_no_color + counts.dropped_no_camera_info +
-         counts.dropped_no_pose + counts.dropped_overflow + refused_;
+         counts.dropped_no_pose + counts.dropped_overflow + counts.dropped_restart + refused_;
 }
 
 std::uint64_t RobotInput::lost() const {

@@ -90,7 +90,6 @@ class RobotInput {
   void heard(Stream stream);
   void judge_silence();
   std::string topic_of(Stream stream) const;
-  static InputProblem backwards(StampNs stamp_ns);
 
   RobotConfig robot_;
   const std::string map_frame_;

@@ -3,9 +3,11 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "pocd/input/camera_model.hpp"
 #include "pocd/input/pose_quaternion.hpp"
+#include "pocd/input/transform_tree.hpp"
 #include "pocd/recording/cdr.hpp"
 
 namespace pocd::recording {
@@ -63,14 +65,20 @@ inline Bytes odometry_payload(StampNs stamp_ns, const std::string& parent, const
   return out.bytes();
 }
 
+inline Bytes tf_payload(const std::vector<StampedTransform>& transforms) {
+  CdrWriter out;
+  out.number(static_cast<std::uint32_t>(transforms.size()));
+  for (const auto& [parent, child, stamp_ns, T] : transforms) {
+    put_header(out, stamp_ns, parent);
+    out.string(child);
+    put_pose(out, T);
+  }
+  return out.bytes();
+}
+
 inline Bytes tf_payload(StampNs stamp_ns, const std::string& parent, const std::string& child,
                         const PoseQuaternion& T) {
-  CdrWriter out;
-  out.number(std::uint32_t{1});
-  put_header(out, stamp_ns, parent);
-  out.string(child);
-  put_pose(out, T);
-  return out.bytes();
+  return tf_payload({{parent, child, stamp_ns, T}});
 }
 
 }  // namespace pocd::recording

@@ -58,7 +58,8 @@ YAML::Node parse_override(const std::string& text) {
 }
 
 YAML::Node read_file(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file)) throw InputError("is a folder, not a file");
+  std::error_code unreadable;  // is said by what follows
+  if (std::filesystem::is_directory(file, unreadable)) throw InputError("is a folder, not a file");
   const std::vector<YAML::Node> documents = YAML::LoadAllFromFile(file.string());
   if (documents.size() > 1) throw InputError("holds more than one YAML document");
   return documents.empty() ? YAML::Node() : documents.front();

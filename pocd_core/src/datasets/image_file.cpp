@@ -29,12 +29,82 @@ void require_whole(const std::vector<unsigned char>& bytes, const fs::path& file
   }
 }
 
-cv::Mat read_image(const fs::path& file, int flags) {
+std::vector<unsigned char> bytes_of(const fs::path& file) {
+  std::error_code error;
+  const bool regular = fs::is_regular_file(file, error);
+  const std::uintmax_t size = regular ? fs::file_size(file, error) : 0;
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file.string() + ": cannot be read");
-  const std::vector<unsigned char> bytes((std::istreambuf_iterator<char>(in)), {});
+  if (!regular || error || !in) throw InputError(file.string() + ": cannot be read");
+  std::vector<unsigned char> bytes(size);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
+}
+
+using Bytes = std::vector<unsigned char>;
+
+/// Reads a number of `count` bytes; -1 beyond the end.
+long number_at(const Bytes& bytes, std::size_t at, int count, bool big_endian) {
+  if (at + static_cast<std::size_t>(count) > bytes.size()) return -1;
+  long value = 0;
+  for (int i = 0; i < count; ++i) {
+    value = value << 8 | bytes[at + static_cast<std::size_t>(big_endian ? i : count - 1 - i)];
+  }
+  return value;
+}
+
+/// Width and height as the header says them; 0 x 0 for an unknown format or a damaged header. A few
+/// kilobytes can hold an image of gigabytes.
+std::pair<long, long> announced_size(const Bytes& bytes) {
+  const auto begins_with = [&](std::initializer_list<unsigned char> start) {
+    return bytes.size() >= start.size() && std::equal(start.begin(), start.end(), bytes.begin());
+  };
+  if (begins_with({0x89, 'P', 'N', 'G'})) {
+    return {number_at(bytes, 16, 4, true), number_at(bytes, 20, 4, true)};
+  }
+  if (begins_with({0x76, 0x2F, 0x31, 0x01})) {  // OpenEXR: box of whole numbers, ends included
+    const std::string name("dataWindow\0box2i\0", 17);
+    const auto found = std::search(bytes.begin(), bytes.end(), name.begin(), name.end());
+    if (found == bytes.end()) return {0, 0};
+    const auto at = static_cast<std::size_t>(found - bytes.begin()) + name.size() + 4;
+    const auto corner = [&](std::size_t i) {
+      return static_cast<long>(static_cast<std::int32_t>(number_at(bytes, at + 4 * i, 4, false)));
+    };
+    return {corner(2) - corner(0) + 1, corner(3) - corner(1) + 1};
+  }
+  if (!begins_with({0xFF, 0xD8})) return {0, 0};
+  for (std::size_t at = 2; at + 4 <= bytes.size() && bytes[at] == 0xFF;) {  // JPEG: segments
+    const int marker = bytes[at + 1];
+    const bool frame =
+        marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+    if (frame) return {number_at(bytes, at + 7, 2, true), number_at(bytes, at + 5, 2, true)};
+    at += marker == 0xFF ? 1 : 2 + static_cast<std::size_t>(number_at(bytes, at + 2, 2, true));
+  }
+  return {0, 0};
+}
+
+void check_size(const Bytes& bytes, cv::Size expected, const fs::path& file) {
+  constexpr long kLargestSide = 16384;
+  const auto [width, height] = announced_size(bytes);
+  const std::string text = std::to_string(width) + "x" + std::to_string(height);
+  if (width < 1 || height < 1) {
+    throw InputError(file.string() + ": is no image that can be decoded");
+  }
+  if (width > kLargestSide || height > kLargestSide) {
+    throw InputError(file.string() + ": image is " + text + ", more than " +
+                     std::to_string(kLargestSide) + " a side");
+  }
+  if (expected.width > 0 && (width != expected.width || height != expected.height)) {
+    throw InputError(file.string() + ": image is " + text + ", camera is " +
+                     std::to_string(expected.width) + "x" + std::to_string(expected.height));
+  }
+}
+
+cv::Mat read_image(const fs::path& file, cv::Size size, int flags) {
+  const Bytes bytes = bytes_of(file);
   if (bytes.empty()) throw InputError(file.string() + ": file is empty");
   require_whole(bytes, file);
+  check_size(bytes, size, file);
   cv::Mat image;
   try {
     image = cv::imdecode(bytes, flags);
@@ -52,8 +122,8 @@ std::string kind_of(const cv::Mat& image) {
 
 }  // namespace
 
-cv::Mat read_depth_image(const fs::path& file) {
-  const cv::Mat image = read_image(file, cv::IMREAD_UNCHANGED);
+cv::Mat read_depth_image(const fs::path& file, cv::Size size) {
+  const cv::Mat image = read_image(file, size, cv::IMREAD_UNCHANGED);
   if (image.type() != CV_16UC1) {
     throw InputError(file.string() + ": has " + kind_of(image) +
                      ", a depth image has 1 channel of 16 bits (mm)");
@@ -61,8 +131,8 @@ cv::Mat read_depth_image(const fs::path& file) {
   return image;
 }
 
-cv::Mat read_label_image(const fs::path& file) {
-  const cv::Mat image = read_image(file, cv::IMREAD_UNCHANGED);
+cv::Mat read_label_image(const fs::path& file, cv::Size size) {
+  const cv::Mat image = read_image(file, size, cv::IMREAD_UNCHANGED);
   if (image.type() != CV_8UC1 && image.type() != CV_16UC1) {
     throw InputError(file.string() + ": has " + kind_of(image) +
                      ", a segmentation image has 1 channel of 8 or 16 bits (class index)");
@@ -70,10 +140,10 @@ cv::Mat read_label_image(const fs::path& file) {
   return image;
 }
 
-cv::Mat read_metre_image(const fs::path& file) {
+cv::Mat read_metre_image(const fs::path& file, cv::Size size) {
   // OpenCV reads this format only where the environment says so, for fear of untrusted files.
   static const bool allowed = ::setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 0) == 0;
-  const cv::Mat image = allowed ? read_image(file, cv::IMREAD_UNCHANGED) : cv::Mat();
+  const cv::Mat image = allowed ? read_image(file, size, cv::IMREAD_UNCHANGED) : cv::Mat();
   if (image.depth() != CV_32F) {
     throw InputError(file.string() + ": has " + kind_of(image) +
                      ", a depth image in metres has floating-point numbers");
@@ -89,9 +159,9 @@ cv::Mat read_metre_image(const fs::path& file) {
   return metres;
 }
 
-cv::Mat read_id_image(const fs::path& file) {
-  const cv::Mat image = read_image(file, cv::IMREAD_UNCHANGED);
-  if (image.channels() < 3 || image.elemSize1() > 2) return read_label_image(file);
+cv::Mat read_id_image(const fs::path& file, cv::Size size) {
+  const cv::Mat image = read_image(file, size, cv::IMREAD_UNCHANGED);
+  if (image.channels() < 3 || image.elemSize1() > 2) return read_label_image(file, size);
   cv::Mat ids, other;
   cv::extractChannel(image, ids, 0);
   for (int channel = 1; channel < 3; ++channel) {
@@ -103,13 +173,21 @@ cv::Mat read_id_image(const fs::path& file) {
   return ids;
 }
 
-cv::Mat read_color_image(const fs::path& file) { return read_image(file, cv::IMREAD_COLOR); }
+cv::Mat read_color_image(const fs::path& file, cv::Size size) {
+  return read_image(file, size, cv::IMREAD_COLOR);
+}
 
 std::map<int, fs::path> numbered_files(const fs::path& folder, const std::string& prefix,
                                        const std::string& suffix) {
   std::map<int, fs::path> out;
-  if (!fs::is_directory(folder)) return out;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    if (!error || error == std::errc::no_such_file_or_directory) return out;
+    throw InputError(folder.string() + ": cannot be read: " + error.message());
+  }
+  fs::directory_iterator entries(folder, error);
+  if (error) throw InputError(folder.string() + ": cannot be read: " + error.message());
+  for (const fs::directory_entry& entry : entries) {
     const std::string name = entry.path().filename().string();
     if (name.size() <= prefix.size() + suffix.size()) continue;
     const std::string digits =
@@ -119,7 +197,7 @@ std::map<int, fs::path> numbered_files(const fs::path& folder, const std::string
         name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0 &&
         digits.size() <= 9 &&
         std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); });
-    if (!fits) continue;
+    if (!fits || !entry.is_regular_file(error)) continue;
     const auto [place, fresh] = out.emplace(std::stoi(digits), entry.path());
     if (!fresh) {
       const auto [first, second] = std::minmax(place->second, entry.path());
@@ -130,7 +208,11 @@ std::map<int, fs::path> numbered_files(const fs::path& folder, const std::string
 }
 
 void require_folder(const fs::path& folder) {
-  if (!fs::is_directory(folder)) throw InputError(folder.string() + ": no such folder");
+  std::error_code error;
+  if (fs::is_directory(folder, error)) return;
+  const bool missing = !error || error == std::errc::no_such_file_or_directory;
+  throw InputError(folder.string() +
+                   (missing ? ": no such folder" : ": cannot be read: " + error.message()));
 }
 
 }  // namespace pocd

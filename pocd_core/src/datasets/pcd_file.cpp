@@ -4,10 +4,14 @@
 #include <pcl/console/print.h>
 #include <pcl/io/pcd_io.h>
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "pocd/common/check.hpp"
 
@@ -16,30 +20,90 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// PCL maps the file into memory by the sizes in its header; a file shorter than that would end the
-/// process with a bus error, so the size is checked before.
+constexpr std::uint64_t kLargestSide = 16384;
+
+/// What a header says of the size of its points.
+struct Layout {
+  std::uint64_t width = 0, height = 0, points = 0, point_bytes = 0;
+};
+
+/// The whole numbers after the first word of a line; empty when one of them is none.
+std::vector<std::uint64_t> numbers_of(const std::string& line) {
+  std::istringstream in(line);
+  std::string word;
+  std::vector<std::uint64_t> numbers;
+  for (in >> word; in >> word;) {
+    std::uint64_t number = 0;
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+    if (error != std::errc() || stop != word.data() + word.size() || number > 0xFFFFFFFFu)
+      return {};
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+/// PCL makes room for all points by the sizes in the header and maps the file by them: a header
+/// could take all memory, and a file that is shorter than that would end the process with a bus
+/// error. So the sizes are checked before.
 void require_whole(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file.string() + ": cannot be read");
   std::string line;
+  Layout layout;
+  std::vector<std::uint64_t> sizes, counts;
   bool found = false;
   for (int i = 0; i < 64 && !found && std::getline(in, line); ++i) {
-    found = line.compare(0, 5, "DATA ") == 0;
+    const std::string key = line.substr(0, line.find(' '));
+    const std::vector<std::uint64_t> numbers = numbers_of(line);
+    const std::uint64_t first = numbers.empty() ? 0 : numbers[0];
+    if (key == "SIZE") sizes = numbers;
+    if (key == "COUNT") counts = numbers;
+    if (key == "WIDTH") layout.width = first;
+    if (key == "HEIGHT") layout.height = first;
+    if (key == "POINTS") layout.points = first;
+    found = key == "DATA";
   }
   if (!found) throw InputError(file.string() + ": has no PCD header");
-  if (line.compare(0, 22, "DATA binary_compressed") != 0) return;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const std::uint64_t count = i < counts.size() ? counts[i] : 1;
+    if (sizes[i] > 8 || count > 64) {
+      throw InputError(file.string() + ": has a field of " + std::to_string(sizes[i]) + " x " +
+                       std::to_string(count) + " bytes");
+    }
+    layout.point_bytes += sizes[i] * count;
+  }
+  if (layout.width > kLargestSide || layout.height > kLargestSide ||
+      (layout.points != 0 && layout.points != layout.width * layout.height)) {
+    throw InputError(file.string() + ": is " + std::to_string(layout.width) + "x" +
+                     std::to_string(layout.height) + " with " + std::to_string(layout.points) +
+                     " points");
+  }
+  std::error_code error;
+  const std::uint64_t file_bytes = fs::file_size(file, error);
   const std::uint64_t begin = static_cast<std::uint64_t>(in.tellg());
-  std::uint32_t sizes[2] = {0, 0};
-  in.read(reinterpret_cast<char*>(sizes), sizeof sizes);
-  if (!in || fs::file_size(file) < begin + sizeof sizes + sizes[0]) {
+  const std::uint64_t points = layout.width * layout.height;
+  std::uint64_t needed = points * layout.point_bytes;
+  if (line.compare(0, 22, "DATA binary_compressed") == 0) {
+    std::uint32_t compressed[2] = {0, 0};
+    in.read(reinterpret_cast<char*>(compressed), sizeof compressed);
+    // LZF makes at most 264 bytes of 3.
+    needed = in ? std::max<std::uint64_t>(sizeof compressed + compressed[0], needed / 88)
+                : file_bytes + 1;
+  } else if (line.compare(0, 11, "DATA binary") != 0) {
+    needed = points * 2 * std::max<std::size_t>(sizes.size(), 1);  // a digit and a separator
+  }
+  if (error || file_bytes + 1 < begin + needed) {  // the last separator may be missing
     throw InputError(file.string() + ": file is shorter than its header says");
   }
 }
 
+/// A field of four bytes that lies within the point.
 const pcl::PCLPointField* field_of(const pcl::PCLPointCloud2& cloud, const std::string& name,
                                    unsigned type) {
   for (const pcl::PCLPointField& field : cloud.fields) {
-    if (field.name == name && (type == 0 || field.datatype == type)) return &field;
+    if (field.name == name && field.datatype == type && field.offset + 4 <= cloud.point_step) {
+      return &field;
+    }
   }
   return nullptr;
 }
@@ -81,8 +145,12 @@ PcdImages read_pcd(const fs::path& file) {
     throw InputError(file.string() + ": has no float fields x y z");
   }
   const auto* label = field_of(cloud, "label", pcl::PCLPointField::UINT32);
-  const auto* color = field_of(cloud, "rgba", 0);
-  if (!color) color = field_of(cloud, "rgb", 0);
+  const pcl::PCLPointField* color = nullptr;
+  for (const char* name : {"rgba", "rgb"}) {
+    for (const unsigned type : {pcl::PCLPointField::UINT32, pcl::PCLPointField::FLOAT32}) {
+      if (!color) color = field_of(cloud, name, type);
+    }
+  }
   const int rows = static_cast<int>(cloud.height), cols = static_cast<int>(cloud.width);
   PcdImages out;
   out.depth_m.create(rows, cols, CV_32FC1);

@@ -28,12 +28,14 @@ CameraModel read_intrinsics(const fs::path& file) {
   const Eigen::MatrixXd K = read_matrix(file, 3, 3);
   CameraModel camera;
   camera.fx = K(0, 0), camera.fy = K(1, 1), camera.cx = K(0, 2), camera.cy = K(1, 2);
-  camera.width = camera.height = 1;
-  validate(camera, file.string());
+  for (const auto& [field, value] : {std::pair("fx", camera.fx), std::pair("fy", camera.fy)}) {
+    if (value > 0.0) continue;
+    throw InputError(file.string() + ": camera " + field + " = " + std::to_string(value) +
+                     ", must be > 0");
+  }
   if (K(0, 1) != 0.0 || K(1, 0) != 0.0 || K(2, 0) != 0.0 || K(2, 1) != 0.0 || K(2, 2) != 1.0) {
     throw InputError(file.string() + ": is no intrinsics matrix [fx 0 cx; 0 fy cy; 0 0 1]");
   }
-  camera.width = camera.height = 0;
   return camera;
 }
 
@@ -86,10 +88,11 @@ class RgbdReader : public ListedReader<Entry> {
     }
     validate_pose(T_W_C, entry.pose.string());
     T_W_C.linear() = Eigen::Quaterniond(T_W_C.linear()).normalized().toRotationMatrix();
-    const cv::Mat depth = read_depth_image(entry.depth);
-    const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
     CameraModel camera = folder.camera;
+    const cv::Mat depth = read_depth_image(entry.depth, image_size(camera));
     if (camera.width == 0) camera.width = depth.cols, camera.height = depth.rows;
+    const cv::Mat color =
+        entry.color.empty() ? cv::Mat() : read_color_image(entry.color, image_size(camera));
     const Pose T_level_C = folder.R_level_W * T_W_C;
     Frame frame = make_frame(stamp_ns(index), camera, T_level_C, depth, cv::Mat(), color,
                              entry.depth.string());

@@ -64,6 +64,16 @@ std::vector<double> parse_numbers(const NumberedLine& line, std::size_t count,
   return out;
 }
 
+std::optional<int> leading_index(const NumberedLine& line) {
+  const std::vector<std::string> words = words_of(line.text);
+  if (words.empty()) return std::nullopt;
+  const char* const end = words[0].data() + words[0].size();
+  int number = -1;
+  const auto [stop, error] = std::from_chars(words[0].data(), end, number);
+  if (error != std::errc() || stop != end || number < 0) return std::nullopt;
+  return number;
+}
+
 Eigen::MatrixXd read_matrix(const std::filesystem::path& file, int rows, int columns) {
   const std::vector<NumberedLine> lines = read_lines(file);
   if (static_cast<int>(lines.size()) != rows) {
@@ -84,7 +94,8 @@ Eigen::Quaterniond read_levelling(const std::filesystem::path& folder,
   Eigen::Vector3d down_W = gravity_W.value_or(-Eigen::Vector3d::UnitZ());
   std::string source = "option gravity";
   const std::filesystem::path file = folder / "gravity.txt";
-  if (!gravity_W && std::filesystem::exists(file)) {
+  std::error_code unreadable;  // there is one then, and reading it says so
+  if (!gravity_W && (std::filesystem::exists(file, unreadable) || unreadable)) {
     down_W = read_matrix(file, 1, 3).transpose();
     source = file.string();
   }

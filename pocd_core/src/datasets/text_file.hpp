@@ -25,6 +25,9 @@ std::string place(const std::filesystem::path& file, int line);
 std::vector<double> parse_numbers(const NumberedLine& line, std::size_t count,
                                   const std::filesystem::path& file);
 
+/// The whole number >= 0 that is the first word of a line, or nothing.
+std::optional<int> leading_index(const NumberedLine& line);
+
 /// A matrix of `rows` x `columns` finite numbers, a row per line. Throws InputError.
 Eigen::MatrixXd read_matrix(const std::filesystem::path& file, int rows, int columns);
 

@@ -1,6 +1,4 @@
-#include <charconv>
 #include <cmath>
-#include <set>
 
 #include "image_file.hpp"
 #include "listed_reader.hpp"
@@ -17,6 +15,7 @@ namespace fs = std::filesystem;
 struct Entry {
   fs::path folder;
   int number = 0;
+  bool has_pose = false;
   std::string problem;  // not empty: the frame is bad, and why
   StampNs stamp_ns = 0;
   Pose T_W_B = Pose::Identity();
@@ -41,17 +40,6 @@ void parse_pose(const NumberedLine& line, const fs::path& file, Entry& entry) {
   entry.T_W_B.linear() = q.normalized().toRotationMatrix();
 }
 
-/// The image index at the start of a line, or nothing.
-std::optional<int> leading_index(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t");
-  if (begin == std::string::npos) return std::nullopt;
-  const std::size_t end = std::min(text.find_first_of(" \t,", begin), text.size());
-  int number = -1;
-  const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, number);
-  if (error != std::errc() || stop != text.data() + end || number < 0) return std::nullopt;
-  return number;
-}
-
 class TorwicReader : public ListedReader<Entry> {
  public:
   explicit TorwicReader(const DatasetOptions& options)
@@ -74,7 +62,7 @@ class TorwicReader : public ListedReader<Entry> {
     const fs::path pose_file = folder / "poses.txt";
     std::map<int, Entry> entries;
     for (const NumberedLine& line : read_lines(pose_file)) {
-      const std::optional<int> number = leading_index(line.text);
+      const std::optional<int> number = leading_index(line);
       if (!number) {
         skip(place(pose_file, line.number) + ": does not begin with an image index");
         ++lines_without_frame_;
@@ -86,6 +74,7 @@ class TorwicReader : public ListedReader<Entry> {
         continue;
       }
       Entry& entry = entries[*number];
+      entry.has_pose = true;
       try {
         parse_pose(line, pose_file, entry);
       } catch (const InputError& error) {
@@ -98,7 +87,7 @@ class TorwicReader : public ListedReader<Entry> {
     if (depths.empty()) throw InputError((folder / "Depth").string() + ": no images in it");
     for (const auto& [number, file] : depths) {
       Entry& entry = entries[number];
-      if (entry.stamp_ns == 0 && entry.problem.empty() && entry.T_W_B.matrix().isIdentity()) {
+      if (!entry.has_pose) {
         entry.problem = file.string() + ": poses.txt has no line with this index";
       }
     }
@@ -148,9 +137,11 @@ class TorwicReader : public ListedReader<Entry> {
   Frame read(std::size_t index) override {
     const Entry& entry = entries_[index];
     if (!entry.problem.empty()) throw InputError(entry.problem);
-    const cv::Mat depth = read_depth_image(entry.depth);
-    const cv::Mat labels = entry.labels.empty() ? cv::Mat() : read_label_image(entry.labels);
-    const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
+    const cv::Mat depth = read_depth_image(entry.depth, image_size(camera_));
+    const cv::Mat labels =
+        entry.labels.empty() ? cv::Mat() : read_label_image(entry.labels, image_size(camera_));
+    const cv::Mat color =
+        entry.color.empty() ? cv::Mat() : read_color_image(entry.color, image_size(camera_));
     return make_frame(entry.stamp_ns, camera_, entry.T_W_B * extrinsics_.T_B_C, depth, labels,
                       color, entry.depth.string());
   }

@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "image_file.hpp"
 #include "listed_reader.hpp"
@@ -17,6 +17,7 @@ struct Entry {
   Pose T_W_C = Pose::Identity();
   fs::path depth, labels, color;  // the latter two may be empty
   std::string problem;            // not empty: the frame cannot be used
+  bool has_pose = false;
 };
 
 struct Folder {
@@ -31,7 +32,9 @@ CameraModel read_calibration(const fs::path& file) {
   if (row(0, 4) != std::floor(row(0, 4)) || row(0, 5) != std::floor(row(0, 5))) {
     throw InputError(file.string() + ": width and height must be whole numbers");
   }
-  camera.width = static_cast<int>(row(0, 4)), camera.height = static_cast<int>(row(0, 5));
+  // Out of range for a camera, too, and no int is undefined.
+  const auto side = [](double value) { return static_cast<int>(std::clamp(value, -1.0, 1e9)); };
+  camera.width = side(row(0, 4)), camera.height = side(row(0, 5));
   validate(camera, file.string());
   return camera;
 }
@@ -52,7 +55,8 @@ Pose parse_pose(const NumberedLine& line, const fs::path& file) {
 /// The sensor-like depth if there is a choice.
 fs::path depth_folder(const fs::path& path) {
   for (const char* name : {"depth_noise", "depth_original", "depth"}) {
-    if (fs::is_directory(path / name)) return path / name;
+    std::error_code unreadable;  // is none then
+    if (fs::is_directory(path / name, unreadable)) return path / name;
   }
   throw InputError(path.string() + ": has no folder depth_noise, depth_original or depth");
 }
@@ -103,15 +107,20 @@ class ToycarReader : public ListedReader<Entry> {
 
   void read_trajectory(const fs::path& file, std::map<int, Entry>& by_number) {
     for (const NumberedLine& line : read_lines(file)) {
-      int number = -1;
-      if (std::sscanf(line.text.c_str(), "%d", &number) != 1 || number < 0) {
+      const std::optional<int> number = leading_index(line);
+      if (!number) {
         problems_.push_back(place(file, line.number) + ": does not begin with an image number");
         continue;
       }
-      const auto found = by_number.find(number);
+      const auto found = by_number.find(*number);
       if (found == by_number.end()) {
         problems_.push_back(place(file, line.number) + ": there is no depth image " +
-                            std::to_string(number));
+                            std::to_string(*number));
+        continue;
+      }
+      if (std::exchange(found->second.has_pose, true)) {
+        problems_.push_back(place(file, line.number) + ": number " + std::to_string(*number) +
+                            " again");
         continue;
       }
       try {
@@ -127,10 +136,11 @@ class ToycarReader : public ListedReader<Entry> {
     const Entry& entry = entries_[index];
     if (!entry.problem.empty()) throw InputError(entry.problem);
     const Folder& folder = folders_[entry.folder];
-    const cv::Mat depth = entry.depth.extension() == ".exr" ? read_metre_image(entry.depth)
-                                                            : read_depth_image(entry.depth);
-    const cv::Mat labels = entry.labels.empty() ? cv::Mat() : read_id_image(entry.labels);
-    const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color);
+    const cv::Size size = image_size(folder.camera);
+    const cv::Mat depth = entry.depth.extension() == ".exr" ? read_metre_image(entry.depth, size)
+                                                            : read_depth_image(entry.depth, size);
+    const cv::Mat labels = entry.labels.empty() ? cv::Mat() : read_id_image(entry.labels, size);
+    const cv::Mat color = entry.color.empty() ? cv::Mat() : read_color_image(entry.color, size);
     return make_frame(stamp_ns(index), folder.camera, folder.R_level_W * entry.T_W_C, depth, labels,
                       color, entry.depth.string());
   }

@@ -7,19 +7,53 @@
 
 namespace pocd {
 
-void validate(const CameraModel& camera, const std::string& source) {
-  const auto fail = [&](const char* field, double value, const char* rule) {
-    throw InputError(source + ": camera " + field + " = " + std::to_string(value) + ", " + rule);
+namespace {
+
+std::string fault(const char* field, double value, const std::string& rule) {
+  return "camera " + std::string(field) + " = " + std::to_string(value) + ", " + rule;
+}
+
+std::string range_text(double low, double high) {
+  return "not in [" + std::to_string(low) + ", " + std::to_string(high) + "]";
+}
+
+}  // namespace
+
+std::string camera_fault(const CameraModel& camera) {
+  constexpr double kShortest = 0.05, kLongest = 100.0;
+  struct Axis {
+    const char *size_name, *focal_name, *centre_name;
+    int size;
+    double focal, centre;
   };
-  if (camera.width < 1 || camera.width > 16384) fail("width", camera.width, "not in [1, 16384]");
-  if (camera.height < 1 || camera.height > 16384)
-    fail("height", camera.height, "not in [1, 16384]");
-  if (!(std::isfinite(camera.fx) && camera.fx > 0.0))
-    fail("fx", camera.fx, "must be finite and > 0");
-  if (!(std::isfinite(camera.fy) && camera.fy > 0.0))
-    fail("fy", camera.fy, "must be finite and > 0");
-  if (!std::isfinite(camera.cx)) fail("cx", camera.cx, "must be finite");
-  if (!std::isfinite(camera.cy)) fail("cy", camera.cy, "must be finite");
+  const Axis axes[] = {{"width", "fx", "cx", camera.width, camera.fx, camera.cx},
+                       {"height", "fy", "cy", camera.height, camera.fy, camera.cy}};
+  for (const Axis& axis : axes) {
+    if (axis.size < 1 || axis.size > 16384) {
+      return fault(axis.size_name, axis.size, "not in [1, 16384]");
+    }
+  }
+  for (const Axis& axis : axes) {
+    if (!std::isfinite(axis.focal) || axis.focal <= 0.0) {
+      return fault(axis.focal_name, axis.focal, "must be finite and > 0");
+    }
+    if (!std::isfinite(axis.centre)) return fault(axis.centre_name, axis.centre, "must be finite");
+  }
+  for (const Axis& axis : axes) {
+    const double size = axis.size;
+    if (axis.focal < kShortest * size || axis.focal > kLongest * size) {
+      return fault(axis.focal_name, axis.focal, range_text(kShortest * size, kLongest * size));
+    }
+    if (axis.centre < -size || axis.centre > 2.0 * size) {
+      return fault(axis.centre_name, axis.centre, range_text(-size, 2.0 * size));
+    }
+  }
+  return "";
+}
+
+void validate(const CameraModel& camera, const std::string& source) {
+  const std::string fault = camera_fault(camera);
+  if (!fault.empty()) throw InputError(source + ": " + fault);
 }
 
 }  // namespace pocd

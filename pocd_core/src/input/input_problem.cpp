@@ -22,6 +22,8 @@ const char* to_string(InputReason reason) {
       return "bad_image_size";
     case InputReason::kZeroFocalLength:
       return "zero_focal_length";
+    case InputReason::kBadIntrinsics:
+      return "bad_intrinsics";
     case InputReason::kNotFinite:
       return "not_finite";
     case InputReason::kNonUnitQuaternion:
@@ -30,6 +32,8 @@ const char* to_string(InputReason reason) {
       return "empty_frame_name";
     case InputReason::kStampBackwards:
       return "stamp_backwards";
+    case InputReason::kStampsRestarted:
+      return "stamps_restarted";
     case InputReason::kSizesDisagree:
       return "sizes_disagree";
     case InputReason::kWrongType:

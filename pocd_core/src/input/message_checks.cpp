@@ -101,6 +101,10 @@ ColourTable::ColourTable(const ClassMap& classes) {
     }
     const std::uint32_t key =
         std::uint32_t{(*rgb)[0]} << 16 | std::uint32_t{(*rgb)[1]} << 8 | std::uint32_t{(*rgb)[2]};
+    if (!classes.fits_a_pixel(info.id)) {
+      throw InputError("classes.list: class " + std::to_string(info.id) + " with label_divisor " +
+                       std::to_string(classes.label_divisor) + " is beyond 16 bits");
+    }
     if (!values_.emplace(key, info.id * classes.label_divisor).second) {
       throw InputError("classes.list: class " + std::to_string(info.id) + ": rgb \"" + info.rgb +
                        "\" is another class's colour already");
@@ -170,6 +174,9 @@ Checked<CameraModel> camera_model(std::uint32_t width, std::uint32_t height,
   camera.cy = k[5];
   if (camera.fx <= 0.0 || camera.fy <= 0.0) {
     return {InputReason::kZeroFocalLength, "fx = " + text(camera.fx) + ", fy = " + text(camera.fy)};
+  }
+  if (auto fault = camera_fault(camera); !fault.empty()) {
+    return {InputReason::kBadIntrinsics, std::move(fault)};
   }
   return camera;
 }

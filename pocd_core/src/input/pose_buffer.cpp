@@ -29,15 +29,18 @@ PoseBuffer::PoseBuffer(StampNs max_gap_ns, std::size_t capacity)
   POCD_CHECK(max_gap_ns > 0 && capacity > 1);
 }
 
-bool PoseBuffer::add(StampNs stamp_ns, const PoseQuaternion& pose) {
-  if (!entries_.empty() && stamp_ns < entries_.back().stamp_ns) return false;
+StampOrder::Verdict PoseBuffer::add(StampNs stamp_ns, const PoseQuaternion& pose) {
   if (!entries_.empty() && stamp_ns == entries_.back().stamp_ns) {
     entries_.back().pose = pose;
-    return true;
+    return StampOrder::Verdict::kAccepted;
   }
+  const StampOrder::Verdict verdict = order_.judge(stamp_ns);
+  if (verdict == StampOrder::Verdict::kRefused) return verdict;
+  // Nothing is interpolated from one clock into another.
+  if (verdict == StampOrder::Verdict::kRestarted) entries_.clear();
   entries_.push_back({stamp_ns, pose});
   if (entries_.size() > capacity_) entries_.pop_front();
-  return true;
+  return verdict;
 }
 
 PoseLookup PoseBuffer::at(StampNs stamp_ns, StampNs extrapolation_ns, PoseQuaternion& pose) const {

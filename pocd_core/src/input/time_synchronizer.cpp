@@ -41,12 +41,49 @@ TimeSynchronizer::TimeSynchronizer(const SynchronizerConfig& config,
   POCD_CHECK(config.capacity > 0 && config.max_wait_ns >= 0 && config.tolerance_ns >= 0);
 }
 
-bool TimeSynchronizer::add_image(Stream stream, StampNs stamp_ns, cv::Mat image) {
-  const auto newest = newest_ns_.find(stream);
-  if (newest != newest_ns_.end() && stamp_ns <= newest->second) return false;
-  newest_ns_[stream] = stamp_ns;
-  horizon_ns_ = std::max(horizon_ns_, stamp_ns);
+std::optional<StampNs> TimeSynchronizer::newest_ns(Stream stream) const {
+  const auto order = orders_.find(stream);
+  return order == orders_.end() ? std::nullopt : order->second.newest_ns();
+}
+
+// How far the robot's data has come, whatever the stream.
+StampNs TimeSynchronizer::horizon_ns() const {
+  StampNs horizon_ns = newest_pose_ns_.value_or(std::numeric_limits<StampNs>::min());
+  for (const auto& [stream, order] : orders_) {
+    horizon_ns = std::max(horizon_ns, order.newest_ns().value_or(horizon_ns));
+  }
+  return horizon_ns;
+}
+
+std::optional<InputProblem> TimeSynchronizer::judge(Stream stream, StampNs stamp_ns) {
+  StampOrder& order = orders_[stream];
+  const StampNs before_ns = order.newest_ns().value_or(stamp_ns);
+  const StampOrder::Verdict verdict = order.judge(stamp_ns);
+  if (verdict == StampOrder::Verdict::kRestarted) drop_beyond(stream, stamp_ns);
+  return stamp_problem(verdict, stamp_ns, before_ns);
+}
+
+void TimeSynchronizer::drop_beyond(Stream stream, StampNs stamp_ns) {
+  const auto cut = [stamp_ns](auto& items) {
+    const std::size_t before = items.size();
+    while (!items.empty() && items.back().first >= stamp_ns) items.pop_back();
+    return before - items.size();
+  };
+  if (stream == Stream::kDepth) {
+    counts_.dropped_restart += cut(depth_);
+    watermark_ns_ = std::min(watermark_ns_, stamp_ns - 1);
+  } else if (stream == Stream::kCameraInfo) {
+    cut(infos_);
+  } else {
+    counts_.unmatched_images += cut(stream == Stream::kSegmentation ? segmentation_ : color_);
+  }
+}
+
+std::optional<InputProblem> TimeSynchronizer::add_image(Stream stream, StampNs stamp_ns,
+                                                        cv::Mat image) {
   POCD_CHECK(stream != Stream::kCameraInfo && stream != Stream::kPose);
+  auto problem = judge(stream, stamp_ns);
+  if (stamp_refused(problem)) return problem;
   auto& images = stream == Stream::kDepth          ? depth_
                  : stream == Stream::kSegmentation ? segmentation_
                                                    : color_;
@@ -60,21 +97,22 @@ bool TimeSynchronizer::add_image(Stream stream, StampNs stamp_ns, cv::Mat image)
     }
     images.pop_front();
   }
-  return true;
+  return problem;
 }
 
-bool TimeSynchronizer::add_camera_info(StampNs stamp_ns, const CameraModel& camera) {
-  const auto newest = newest_ns_.find(Stream::kCameraInfo);
-  if (newest != newest_ns_.end() && stamp_ns <= newest->second) return false;
-  newest_ns_[Stream::kCameraInfo] = stamp_ns;
-  horizon_ns_ = std::max(horizon_ns_, stamp_ns);
+std::optional<InputProblem> TimeSynchronizer::add_camera_info(StampNs stamp_ns,
+                                                              const CameraModel& camera) {
+  auto problem = judge(Stream::kCameraInfo, stamp_ns);
+  if (stamp_refused(problem)) return problem;
   infos_.emplace_back(stamp_ns, camera);
   if (infos_.size() > config_.capacity) infos_.pop_front();
-  return true;
+  return problem;
 }
 
-void TimeSynchronizer::pose_seen(StampNs stamp_ns) {
-  horizon_ns_ = std::max(horizon_ns_, stamp_ns);
+void TimeSynchronizer::pose_seen(StampNs stamp_ns, const std::optional<InputProblem>& problem) {
+  if (stamp_refused(problem)) return;
+  const bool restarted = problem && problem->reason == InputReason::kStampsRestarted;
+  newest_pose_ns_ = restarted ? stamp_ns : std::max(newest_pose_ns_.value_or(stamp_ns), stamp_ns);
 }
 
 std::optional<cv::Mat> TimeSynchronizer::match(std::deque<std::pair<StampNs, cv::Mat>>& stream,
@@ -101,17 +139,18 @@ bool TimeSynchronizer::camera_at(StampNs stamp_ns, bool settle, CameraModel& cam
 std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
   std::vector<SyncedFrame> frames;
   blocked_by_.reset();
+  const StampNs newest_of_all_ns = horizon_ns();
   while (!depth_.empty()) {
     const StampNs stamp_ns = depth_.front().first;
-    const bool late = !patient_ && horizon_ns_ - stamp_ns > config_.max_wait_ns;
+    const bool late = !patient_ && newest_of_all_ns - stamp_ns > config_.max_wait_ns;
     const bool settle = last_call || late;
     SyncedFrame frame;
     frame.stamp_ns = stamp_ns;
     std::uint64_t* drop = nullptr;
 
     const auto passed = [&](Stream stream) {  // streams are in order: it will not come any more
-      const auto newest = newest_ns_.find(stream);
-      return newest != newest_ns_.end() && newest->second > stamp_ns + config_.tolerance_ns;
+      const std::optional<StampNs> newest = newest_ns(stream);
+      return newest && *newest > stamp_ns + config_.tolerance_ns;
     };
     // True when the frame may go on as far as this stream is concerned.
     const auto fetch = [&](StreamUse use, Stream stream, auto& images, cv::Mat& out,
@@ -188,8 +227,9 @@ void TimeSynchronizer::restart() {
   segmentation_.clear();
   color_.clear();
   infos_.clear();
-  newest_ns_.clear();
-  horizon_ns_ = watermark_ns_ = std::numeric_limits<StampNs>::min();
+  orders_.clear();
+  newest_pose_ns_.reset();
+  watermark_ns_ = std::numeric_limits<StampNs>::min();
 }
 
 std::vector<SyncedFrame> TimeSynchronizer::take() { return run(false); }

@@ -47,11 +47,11 @@ std::optional<InputProblem> TransformTree::add(const std::string& parent, const 
     }
     edge = edges_.insert_or_assign(child, Edge{parent, false, {}, {max_gap_ns_, capacity_}}).first;
   }
-  if (!edge->second.buffer.add(stamp_ns, T)) {
-    return InputProblem{InputReason::kStampBackwards,
-                        parent + " -> " + child + ": stamp " + std::to_string(stamp_ns) +
-                            " ns is before the last one, " +
-                            std::to_string(edge->second.buffer.newest_ns())};
+  PoseBuffer& buffer = edge->second.buffer;
+  const StampNs before_ns = buffer.empty() ? stamp_ns : buffer.newest_ns();
+  if (auto late = stamp_problem(buffer.add(stamp_ns, T), stamp_ns, before_ns)) {
+    late->detail = parent + " -> " + child + ": " + late->detail;
+    return late;
   }
   return problem;
 }

@@ -181,6 +181,14 @@ void BlockStore::lose(Region& region, const std::string& reason) {
   }
   region.present.reset();
   size_ -= blocks;
+  // Whose voxels they were stood on the page; nothing of the region is on disk any more.
+  for (auto entry = owner_regions_on_disk_.begin(); entry != owner_regions_on_disk_.end();) {
+    std::vector<BlockKey>& keys = entry->second;
+    const auto left = std::remove(keys.begin(), keys.end(), region.key);
+    owner_entries_ -= static_cast<std::size_t>(keys.end() - left);
+    keys.erase(left, keys.end());
+    entry = keys.empty() ? owner_regions_on_disk_.erase(entry) : std::next(entry);
+  }
   if (counts_.blocks_lost == 0 && !problem_) {
     problem_ = reason + ": " + std::to_string(blocks) + " blocks around block (" +
                std::to_string(region.key.x * 8) + ", " + std::to_string(region.key.y * 8) + ", " +

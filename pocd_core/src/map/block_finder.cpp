@@ -13,6 +13,9 @@ namespace {
 
 // Bounds the memory of the grid; 64 M cells are a 100 m range with 3 cm voxels.
 constexpr double kMaxCells = 64e6;
+// A pose that was refined after check_view turns the pyramid by a little.
+constexpr double kMaxCellsRefined = 1.5 * kMaxCells;
+constexpr double kMaxIndex = 1e8, kMaxIndexRefined = 1.01 * kMaxIndex;
 
 constexpr std::uint32_t kNoOwner = 0;
 
@@ -25,12 +28,15 @@ float points_along_band(const TsdfConfig& config, const CameraModel& camera) {
   return static_cast<float>(std::ceil(length_voxels / (0.5 * VoxelBlock::kSide)));
 }
 
-}  // namespace
+/// Blocks of the bounding box of the viewing pyramid: the first one, and how many.
+struct ViewBox {
+  Eigen::Vector3d first, size;
+};
 
-void BlockFinder::place_grid() {
-  const CameraModel& camera = input_->frame->camera;
-  const Pose& T_W_C = input_->frame->T_W_C;
-  const double reach = config_.max_depth_m + config_.truncation_m();
+ViewBox view_box(const TsdfConfig& config, const CameraModel& camera, const Pose& T_W_C,
+                 double most_cells, double largest_index) {
+  const double block_m = config.voxel_size_m * VoxelBlock::kSide;
+  const double reach = config.max_depth_m + config.truncation_m();
   Eigen::Vector3d low = T_W_C.translation(), high = low;
   for (const double u : {-0.5, camera.width - 0.5}) {
     for (const double v : {-0.5, camera.height - 0.5}) {
@@ -41,13 +47,25 @@ void BlockFinder::place_grid() {
   }
   // One cell of margin on every side for rounding; cell 0 is therefore never met and collects the
   // invalid samples.
-  const Eigen::Vector3d first = (low / block_m_).array().floor() - 1.0;
-  const Eigen::Vector3d size = (high / block_m_).array().floor() + 2.0 - first.array();
-  if (!(size.prod() <= kMaxCells) || first.cwiseAbs().maxCoeff() > 1e8) {
-    throw InputError("map: the view up to max_depth_m = " + std::to_string(config_.max_depth_m) +
+  const Eigen::Vector3d first = (low / block_m).array().floor() - 1.0;
+  const Eigen::Vector3d size = (high / block_m).array().floor() + 2.0 - first.array();
+  if (!(size.prod() <= most_cells) || !(first.cwiseAbs().maxCoeff() <= largest_index)) {
+    throw InputError("map: the view up to max_depth_m = " + std::to_string(config.max_depth_m) +
                      " holds too many voxels of voxel_size_m = " +
-                     std::to_string(config_.voxel_size_m) + ", or the pose is too far away");
+                     std::to_string(config.voxel_size_m) + ", or the pose is too far away");
   }
+  return {first, size};
+}
+
+}  // namespace
+
+void check_view(const TsdfConfig& config, const CameraModel& camera, const Pose& T_W_C) {
+  view_box(config, camera, T_W_C, kMaxCells, kMaxIndex);
+}
+
+void BlockFinder::place_grid() {
+  const auto [first, size] = view_box(config_, input_->frame->camera, input_->frame->T_W_C,
+                                      kMaxCellsRefined, kMaxIndexRefined);
   first_ = {static_cast<int>(first.x()), static_cast<int>(first.y()), static_cast<int>(first.z())};
   size_x_ = static_cast<int>(size.x());
   size_y_ = static_cast<int>(size.y());

@@ -12,12 +12,16 @@
 
 namespace pocd {
 
+/// Throws InputError when the viewing pyramid up to the depth limit has too many blocks.
+void check_view(const TsdfConfig& config, const CameraModel& camera, const Pose& T_W_C);
+
 /// Keeps its buffers from frame to frame. The grid of block-sized cells spans the bounding box of
 /// the viewing pyramid up to the depth limit.
 class BlockFinder {
  public:
   /// Marks the cells that the band of a regular sample of pixels passes through and notes the
-  /// farthest depth of every image tile. Throws InputError when the pyramid has too many blocks.
+  /// farthest depth of every image tile. Throws InputError when the pyramid has far too many
+  /// blocks.
   void scan(const TsdfConfig& config, const IntegrationInput& input, ThreadPool& pool);
 
   /// Keys of the marked cells, canonical order.

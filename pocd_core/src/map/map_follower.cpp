@@ -48,7 +48,6 @@ void MapFollower::published(std::uint64_t epoch, std::uint64_t version, const Ma
   const auto foreign = [epoch](const MapDelta& delta) { return delta.epoch != epoch; };
   recent_.erase(std::remove_if(recent_.begin(), recent_.end(), foreign), recent_.end());
   published_epoch_ = epoch;
-  published_version_ = version;
   replica_.note_published(epoch, version, digest);
   know(epoch, version, digest);
   // An empty map needs nothing to arrive.

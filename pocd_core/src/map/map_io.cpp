@@ -111,6 +111,10 @@ void save_map(const TsdfMap& map, const std::filesystem::path& file) {
     out.write(reinterpret_cast<const char*>(bytes.data()),
               static_cast<std::streamsize>(bytes.size()));
   };
+  const auto discard = [&unfinished] {  // as far as that is possible
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+  };
   try {
     write(header_of(map));
     const std::vector<BlockKey> keys = map.keys_by_region();
@@ -130,13 +134,15 @@ void save_map(const TsdfMap& map, const std::filesystem::path& file) {
     }
   } catch (const InputError&) {  // a part of the map is on disk, and unreadable
     out.close();
-    std::filesystem::remove(unfinished);
+    discard();
     throw;
   }
   out.close();
   std::error_code error;
   if (out) std::filesystem::rename(unfinished, file, error);
-  if (!out || error) throw InputError(file.string() + ": map file cannot be written");
+  if (out && !error) return;
+  discard();
+  throw InputError(file.string() + ": map file cannot be written");
 }
 
 TsdfMap load_map(const std::filesystem::path& file, const TsdfConfig& config) {

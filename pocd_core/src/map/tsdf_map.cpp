@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "block_finder.hpp"
 #include "block_store.hpp"
 #include "pocd/common/check.hpp"
 #include "tsdf_integrator.hpp"
@@ -47,6 +48,10 @@ void TsdfMap::integrate(const IntegrationInput& input, ThreadPool& pool) {
   impl_->store.begin_pass();
   impl_->integrator.integrate(impl_->config, input, impl_->store, pool);
   impl_->store.keep_budget();
+}
+
+void TsdfMap::check_view(const Frame& frame) const {
+  pocd::check_view(impl_->config, frame.camera, frame.T_W_C);
 }
 
 std::size_t TsdfMap::clear_object(ObjectId id) {

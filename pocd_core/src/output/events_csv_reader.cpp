@@ -1,3 +1,5 @@
+#include <charconv>
+#include <cmath>
 #include <fstream>
 
 #include "pocd/common/check.hpp"
@@ -44,14 +46,15 @@ class Row {
   }
 
   double number(const std::string& column) const {
-    const std::string& cell = text(column);
-    try {
-      std::size_t used = 0;
-      const double value = std::stod(cell, &used);
-      if (used == cell.size()) return value;
-    } catch (const std::logic_error&) {  // reported below with its place
-    }
-    throw InputError(where_ + ": " + column + " \"" + cell + "\" is no number");
+    const auto value = parse<double>(column);
+    if (value && std::isfinite(*value)) return *value;
+    throw InputError(where_ + ": " + column + " \"" + text(column) + "\" is no number");
+  }
+
+  std::uint32_t id(const std::string& column) const {
+    if (const auto value = parse<std::uint32_t>(column)) return *value;
+    throw InputError(where_ + ": " + column + " \"" + text(column) +
+                     "\" is no whole number of 32 bits");
   }
 
   Eigen::Vector3d position(const std::string& prefix) const {
@@ -68,6 +71,16 @@ class Row {
   }
 
  private:
+  /// The value of a whole cell.
+  template <class T>
+  std::optional<T> parse(const std::string& column) const {
+    const std::string& cell = text(column);
+    const char* const end = cell.data() + cell.size();
+    T value{};
+    const auto [stop, error] = std::from_chars(cell.data(), end, value);
+    return error == std::errc() && stop == end ? std::optional<T>(value) : std::nullopt;
+  }
+
   const std::vector<std::string>& header_;
   std::vector<std::string> cells_;
   std::string where_;
@@ -85,12 +98,11 @@ std::vector<ReportedEvent> read_events_csv(const std::filesystem::path& file) {
     const Row row(header, split(line), file.string() + ":" + std::to_string(number));
     ReportedEvent event;
     event.kind = row.kind();
-    event.object = static_cast<std::uint32_t>(row.number("object_id"));
+    event.object = row.id("object_id");
     event.class_name = row.text("class_name");
     event.position_W = row.position("");
     if (!row.text("previous_x").empty()) event.previous_W = row.position("previous_");
-    if (!row.text("absorbed").empty())
-      event.absorbed = static_cast<std::uint32_t>(row.number("absorbed"));
+    if (!row.text("absorbed").empty()) event.absorbed = row.id("absorbed");
     events.push_back(event);
   }
   return events;

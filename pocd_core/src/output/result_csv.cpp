@@ -8,9 +8,11 @@
 namespace pocd {
 namespace {
 
-/// RFC 4180: quotes where a separator, quote or line break is in the text.
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+/// RFC 4180: quotes where a separator or quote is in the text. A line break becomes a blank: a row
+/// is a line.
+std::string quoted(std::string text) {
+  for (char& c : text) c = c == '\r' || c == '\n' ? ' ' : c;
+  if (text.find_first_of(",\"") == std::string::npos) return text;
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"') out += '"';

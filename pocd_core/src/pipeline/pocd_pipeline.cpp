@@ -71,6 +71,8 @@ struct PocdPipeline::Impl {
     return frame.labels.empty() && robots_with_masks.count(frame.robot) > 0;
   }
 
+  /// Before anything changes: a frame that is refused later would leave half of its traces.
+  void check(const Frame& frame) const;
   void paint_owners();
   void integrate(const Frame& frame);
 };
@@ -80,11 +82,7 @@ PocdPipeline::~PocdPipeline() = default;
 
 FrameResult PocdPipeline::process_frame(const Frame& frame) {
   Impl& p = *impl_;
-  if (frame.depth_m.type() != CV_32FC1 || frame.depth_m.cols != frame.camera.width ||
-      frame.depth_m.rows != frame.camera.height) {
-    throw InputError("frame " + std::to_string(frame.sequence) +
-                     ": depth is not the camera's size in metres");
-  }
+  p.check(frame);
   FrameResult result;
   if (const auto reason = p.pose_gate.refuse(frame)) {
     result.accepted = false;
@@ -130,6 +128,19 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   if (const auto problem = p.map.take_problem()) result.warnings.push_back(*problem);
   clock.done("map");
   return result;
+}
+
+void PocdPipeline::Impl::check(const Frame& frame) const {
+  const std::string source =
+      (frame.robot.empty() ? "" : frame.robot + ": ") + "frame " + std::to_string(frame.sequence);
+  validate_frame(frame, source);
+  const int stride = config.segmentation.stride;
+  if (frame.camera.width < stride || frame.camera.height < stride) {
+    throw InputError(source + ": image is " + std::to_string(frame.camera.width) + "x" +
+                     std::to_string(frame.camera.height) +
+                     ", smaller than segmentation.stride = " + std::to_string(stride));
+  }
+  map.check_view(frame);
 }
 
 void PocdPipeline::Impl::paint_owners() {

@@ -16,8 +16,7 @@ CdrReader::CdrReader(const std::uint8_t* data, std::size_t size) : data_(data), 
     throw DamagedData(
         0, "encapsulation " + std::to_string(data[0] * 256 + data[1]) + " is not plain CDR (0, 1)");
   }
-  little_endian_ = data[1] == 1;
-  swap_ = little_endian_ != kHostIsLittle;
+  swap_ = (data[1] == 1) != kHostIsLittle;
 }
 
 void CdrReader::align(std::size_t to) {

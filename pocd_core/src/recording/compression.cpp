@@ -13,43 +13,88 @@
 namespace pocd::recording {
 namespace {
 
-Bytes decompress_lz4(const std::uint8_t* data, std::size_t size, std::size_t out_size) {
+/// Output of a size that the input only announces: what is not plausible is made as it fills, so
+/// that a few damaged bytes do not cost hundreds of megabytes.
+class Output {
+ public:
+  Output(std::size_t in_size, std::size_t announced)
+      : announced_(announced),
+        bytes_(std::min(announced, kAtOnce + std::min(in_size, announced) * kPlausible)) {}
+
+  std::uint8_t* here() { return bytes_.data() + filled_; }
+  std::size_t room() const { return bytes_.size() - filled_; }
+  void fill(std::size_t count) {
+    filled_ += count;
+    if (room() == 0) bytes_.resize(std::min(announced_, 2 * bytes_.size()));
+  }
+  Bytes take(const std::string& name) {
+    if (filled_ != announced_) {
+      throw DamagedData(0, name + ": gives " + std::to_string(filled_) + " bytes, " +
+                               std::to_string(announced_) + " announced");
+    }
+    return std::move(bytes_);
+  }
+
+ private:
+  static constexpr std::size_t kAtOnce = 65536, kPlausible = 64;
+  std::size_t announced_, filled_ = 0;
+  Bytes bytes_;
+};
+
+/// Runs `step` (in, its size, out, its size; both become what was used; gives what is still wanted,
+/// 0 at the end of a frame) over the input.
+template <class Step>
+Bytes decompress_by(const std::string& name, const std::uint8_t* data, std::size_t size,
+                    std::size_t announced, const Step& step) {
+  Output out(size, announced);
+  std::size_t at = 0;
+  for (std::size_t wanted = 1; wanted != 0 || at < size;) {
+    std::size_t in_step = size - at, out_step = out.room();
+    wanted = step(data + at, in_step, out.here(), out_step, at);
+    at += in_step;
+    out.fill(out_step);
+    if (in_step == 0 && out_step == 0 && (wanted != 0 || at < size)) {
+      throw DamagedData(at, name + ": data ends early or is longer than announced");
+    }
+  }
+  return out.take(name);
+}
+
+Bytes decompress_lz4(const std::uint8_t* data, std::size_t size, std::size_t announced) {
   LZ4F_dctx* raw = nullptr;
   POCD_CHECK(!LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION)));
   const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(
       raw, &LZ4F_freeDecompressionContext);
-  Bytes out(out_size);
-  std::size_t in_at = 0, out_at = 0;
-  // A frame that is over asks for no more input; a full output cannot take any.
-  for (std::size_t wanted = 1; wanted != 0;) {
-    std::size_t in_step = size - in_at, out_step = out_size - out_at;
-    wanted = LZ4F_decompress(context.get(), out.data() + out_at, &out_step, data + in_at, &in_step,
-                             nullptr);
-    if (LZ4F_isError(wanted)) {
-      throw DamagedData(in_at, std::string("lz4: ") + LZ4F_getErrorName(wanted));
-    }
-    in_at += in_step;
-    out_at += out_step;
-    if (wanted != 0 && in_step == 0 && out_step == 0) {
-      throw DamagedData(in_at, "lz4: data ends early or is longer than announced");
-    }
-  }
-  if (out_at != out_size) {
-    throw DamagedData(0, "lz4: gives " + std::to_string(out_at) + " bytes, " +
-                             std::to_string(out_size) + " announced");
-  }
-  return out;
+  return decompress_by("lz4", data, size, announced,
+                       [&](const std::uint8_t* in, std::size_t& in_size, std::uint8_t* out,
+                           std::size_t& out_size, std::size_t at) {
+                         const std::size_t wanted =
+                             LZ4F_decompress(context.get(), out, &out_size, in, &in_size, nullptr);
+                         if (LZ4F_isError(wanted)) {
+                           throw DamagedData(at, std::string("lz4: ") + LZ4F_getErrorName(wanted));
+                         }
+                         return wanted;
+                       });
 }
 
-Bytes decompress_zstd(const std::uint8_t* data, std::size_t size, std::size_t out_size) {
-  Bytes out(out_size);
-  const std::size_t got = ZSTD_decompress(out.data(), out.size(), data, size);
-  if (ZSTD_isError(got)) throw DamagedData(0, std::string("zstd: ") + ZSTD_getErrorName(got));
-  if (got != out_size) {
-    throw DamagedData(0, "zstd: gives " + std::to_string(got) + " bytes, " +
-                             std::to_string(out_size) + " announced");
-  }
-  return out;
+Bytes decompress_zstd(const std::uint8_t* data, std::size_t size, std::size_t announced) {
+  const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(),
+                                                                          &ZSTD_freeDStream);
+  POCD_CHECK(stream != nullptr);
+  return decompress_by("zstd", data, size, announced,
+                       [&](const std::uint8_t* in, std::size_t& in_size, std::uint8_t* out,
+                           std::size_t& out_size, std::size_t at) {
+                         ZSTD_inBuffer input{in, in_size, 0};
+                         ZSTD_outBuffer output{out, out_size, 0};
+                         const std::size_t wanted =
+                             ZSTD_decompressStream(stream.get(), &output, &input);
+                         if (ZSTD_isError(wanted)) {
+                           throw DamagedData(at, std::string("zstd: ") + ZSTD_getErrorName(wanted));
+                         }
+                         in_size = input.pos;
+                         out_size = output.pos;
+                         return wanted;
+                       });
 }
 
 }  // namespace

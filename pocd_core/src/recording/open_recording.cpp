@@ -2,38 +2,11 @@
 
 #include "db3_reader.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/natural_order.hpp"
 #include "pocd/recording/mcap_reader.hpp"
 
 namespace pocd::recording {
-namespace {
-
 namespace fs = std::filesystem;
-
-/// "run_2" before "run_10": digits that belong together compare by value.
-bool natural_less(const std::string& a, const std::string& b) {
-  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!digit(a[i]) || !digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-      continue;
-    }
-    const auto number = [&](const std::string& text, std::size_t& at) {
-      const std::size_t begin = std::min(text.find_first_not_of('0', at), text.size());
-      at = begin;
-      while (at < text.size() && digit(text[at])) ++at;
-      return text.substr(begin, at - begin);
-    };
-    const std::string x = number(a, i), y = number(b, j);
-    if (x.size() != y.size()) return x.size() < y.size();
-    if (x != y) return x < y;
-  }
-  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
-  return a < b;
-}
-
-}  // namespace
 
 std::unique_ptr<RecordingReader> open_recording(const fs::path& file, const ReaderLimits& limits) {
   constexpr char kSqlite[] = "SQLite format 3";
@@ -49,12 +22,17 @@ std::unique_ptr<RecordingReader> open_recording(const fs::path& file, const Read
 }
 
 std::vector<fs::path> recording_files(const fs::path& input) {
-  if (!fs::is_directory(input)) {
-    if (!fs::exists(input)) throw InputError(input.string() + ": does not exist");
-    return {input};
+  std::error_code error;
+  const fs::file_status status = fs::status(input, error);
+  if (status.type() == fs::file_type::not_found) {
+    throw InputError(input.string() + ": does not exist");
   }
+  if (error) throw InputError(input.string() + ": cannot be read: " + error.message());
+  if (!fs::is_directory(status)) return {input};
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(input)) {
+  fs::directory_iterator entries(input, error);
+  if (error) throw InputError(input.string() + ": cannot be read: " + error.message());
+  for (const fs::directory_entry& entry : entries) {
     const std::string extension = entry.path().extension().string();
     if (extension == ".mcap" || extension == ".db3") files.push_back(entry.path());
   }

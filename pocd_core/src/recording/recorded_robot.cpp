@@ -16,10 +16,6 @@ SynchronizerConfig synchronizer_config(const RecordingOptions& options,
   return config;
 }
 
-void refuse_backwards(StampNs stamp_ns) {
-  throw InputError("stamp " + std::to_string(stamp_ns) + " ns is not after the one before");
-}
-
 }  // namespace
 
 RecordedRobot::RecordedRobot(const std::string& name, const RecordingOptions& options,
@@ -31,36 +27,39 @@ RecordedRobot::RecordedRobot(const std::string& name, const RecordingOptions& op
   synchronizer_.set_patient(true);
 }
 
-void RecordedRobot::add_image(TimeSynchronizer::Stream stream, StampNs stamp_ns,
-                              const std::string& frame_id, cv::Mat image) {
+std::optional<InputProblem> RecordedRobot::add_image(TimeSynchronizer::Stream stream,
+                                                     StampNs stamp_ns, const std::string& frame_id,
+                                                     cv::Mat image) {
   if (stream == TimeSynchronizer::Stream::kDepth && !camera_frame_known_) {
-    if (frame_id.empty()) throw InputError("header.frame_id is empty");
+    if (frame_id.empty()) {
+      return InputProblem{InputReason::kEmptyFrameName, "header.frame_id is empty"};
+    }
     camera_frame_known_ = true;
     synchronizer_.set_camera_frame(frame_id);
   }
-  if (!synchronizer_.add_image(stream, stamp_ns, std::move(image))) refuse_backwards(stamp_ns);
+  return synchronizer_.add_image(stream, stamp_ns, std::move(image));
 }
 
-void RecordedRobot::add_camera_info(StampNs stamp_ns, const CameraModel& camera) {
-  if (!synchronizer_.add_camera_info(stamp_ns, camera)) refuse_backwards(stamp_ns);
+std::optional<InputProblem> RecordedRobot::add_camera_info(StampNs stamp_ns,
+                                                           const CameraModel& camera) {
+  return synchronizer_.add_camera_info(stamp_ns, camera);
 }
 
-void RecordedRobot::add_odometry(const StampedTransform& transform) {
+std::optional<InputProblem> RecordedRobot::add_odometry(const StampedTransform& transform) {
   odometry_children_.insert(transform.child);
-  const auto problem =
+  auto problem =
       transforms_.add(transform.parent, transform.child, transform.stamp_ns, transform.T);
-  if (problem) throw InputError(problem->detail);
-  synchronizer_.pose_seen(transform.stamp_ns);
+  synchronizer_.pose_seen(transform.stamp_ns, problem);
+  return problem;
 }
 
-void RecordedRobot::add_transform(const StampedTransform& transform, bool is_static) {
+std::optional<InputProblem> RecordedRobot::add_transform(const StampedTransform& transform,
+                                                         bool is_static) {
   // Odometry says the same on a topic of its own; two sources of one transform would interleave.
-  if (!is_static && odometry_children_.count(transform.child) > 0) return;
-  const auto problem =
-      is_static
-          ? transforms_.set_static(transform.parent, transform.child, transform.T)
-          : transforms_.add(transform.parent, transform.child, transform.stamp_ns, transform.T);
-  if (problem) throw InputError(problem->detail);
+  if (!is_static && odometry_children_.count(transform.child) > 0) return std::nullopt;
+  return is_static
+             ? transforms_.set_static(transform.parent, transform.child, transform.T)
+             : transforms_.add(transform.parent, transform.child, transform.stamp_ns, transform.T);
 }
 
 std::vector<Frame> RecordedRobot::take(bool last_call, std::vector<std::string>& problems) {
@@ -83,7 +82,8 @@ std::vector<Frame> RecordedRobot::take(bool last_call, std::vector<std::string>&
 
 std::uint64_t RecordedRobot::dropped() const {
   const SynchronizerCounts& counts = synchronizer_.counts();
-  return counts.dropped_no_camera_info + counts.dropped_no_pose + counts.dropped_overflow;
+  return counts.dropped_no_camera_info + counts.dropped_no_pose + counts.dropped_overflow +
+         counts.dropped_restart;
 }
 
 std::string RecordedRobot::losses() const {
@@ -96,6 +96,7 @@ std::string RecordedRobot::losses() const {
   add(counts.dropped_no_camera_info, "without camera info");
   add(counts.dropped_no_pose, "without pose");
   add(counts.dropped_overflow, "that waited too long for other streams");
+  add(counts.dropped_restart, "from before the stamps started anew");
   return text.empty() ? text : name_ + ": frames left out: " + text;
 }
 

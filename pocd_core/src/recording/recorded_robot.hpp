@@ -22,16 +22,21 @@ class RecordedRobot {
   RecordedRobot(const RecordedRobot&) = delete;
   RecordedRobot& operator=(const RecordedRobot&) = delete;
 
-  /// Throw InputError for what cannot be used. Stamps are those of the run.
-  void add_image(TimeSynchronizer::Stream stream, StampNs stamp_ns, const std::string& frame_id,
-                 cv::Mat image);
-  void add_camera_info(StampNs stamp_ns, const CameraModel& camera);
-  void add_odometry(const StampedTransform& transform);
-  void add_transform(const StampedTransform& transform, bool is_static);
+  /// What is wrong, as TimeSynchronizer and TransformTree say it: kStampBackwards and
+  /// kEmptyFrameName are not taken, the rest is. Stamps are those of the run.
+  std::optional<InputProblem> add_image(TimeSynchronizer::Stream stream, StampNs stamp_ns,
+                                        const std::string& frame_id, cv::Mat image);
+  std::optional<InputProblem> add_camera_info(StampNs stamp_ns, const CameraModel& camera);
+  std::optional<InputProblem> add_odometry(const StampedTransform& transform);
+  std::optional<InputProblem> add_transform(const StampedTransform& transform, bool is_static);
 
   /// Frames that are ready, by stamp; a frame whose images disagree adds to `problems`.
   std::vector<Frame> take(bool last_call, std::vector<std::string>& problems);
   StampNs watermark_ns() const { return synchronizer_.watermark_ns(); }
+  /// Of the depth images.
+  std::optional<StampNs> newest_ns() const {
+    return synchronizer_.newest_ns(TimeSynchronizer::Stream::kDepth);
+  }
   /// "" or what the frames that were left out lacked.
   std::string losses() const;
   std::uint64_t dropped() const;

@@ -32,11 +32,6 @@ T good(Checked<T> checked) {
   return std::move(*checked.value);
 }
 
-StampedTransform transform_of(const RosTransform& transform) {
-  return good(checked_transform({transform.header.frame_id, transform.child_frame_id,
-                                 transform.header.stamp_ns, transform.T}));
-}
-
 enum class Use { kNone, kImage, kCameraInfo, kOdometry, kTf, kTfStatic };
 
 /// What one channel feeds.
@@ -148,10 +143,18 @@ class RecordingDataset : public DatasetReader {
     reported_ = 0;
     // The parts of one recording follow each other; another run is moved behind the one before.
     const std::optional<StampNs> first_ns = first_stamp(file_);
-    if (first_ns && last_ns_ && *first_ns + shift_ns_ <= *last_ns_) {
-      shift_ns_ = *last_ns_ + kPause - *first_ns;
+    const std::optional<StampNs> last_ns = last_stamp();
+    if (first_ns && last_ns && *first_ns + shift_ns_ <= *last_ns) {
+      shift_ns_ = *last_ns + kPause - *first_ns;
     }
     return true;
+  }
+
+  /// Stamp of the latest depth image of the run so far.
+  std::optional<StampNs> last_stamp() const {
+    std::optional<StampNs> last_ns;
+    for (const auto& [name, robot] : robots_) last_ns = std::max(last_ns, robot->newest_ns());
+    return last_ns;
   }
 
   /// Stamp of the first depth image in a file.
@@ -194,33 +197,45 @@ class RecordingDataset : public DatasetReader {
                          : to.stream == Stream::kColor
                              ? good(color_image(view_of(image)))
                              : good(label_image(view_of(image), colours_)).labels;
-        const StampNs stamp_ns = image.header.stamp_ns + shift_ns_;
-        if (to.stream == Stream::kDepth) last_ns_ = std::max(last_ns_.value_or(stamp_ns), stamp_ns);
-        robot->second->add_image(to.stream, stamp_ns, image.header.frame_id, std::move(pixels));
+        say(message, robot->second->add_image(to.stream, image.header.stamp_ns + shift_ns_,
+                                              image.header.frame_id, std::move(pixels)));
         return;
       }
       case Use::kCameraInfo: {
         const RosCameraInfo info = decode_camera_info(message.data, message.size);
-        robot->second->add_camera_info(info.header.stamp_ns + shift_ns_,
-                                       good(camera_model(info.width, info.height, info.k)));
+        say(message,
+            robot->second->add_camera_info(info.header.stamp_ns + shift_ns_,
+                                           good(camera_model(info.width, info.height, info.k))));
         return;
       }
       case Use::kOdometry:
-        robot->second->add_odometry(shifted(decode_odometry(message.data, message.size)));
+        say(message, robot->second->add_odometry(
+                         good(shifted(decode_odometry(message.data, message.size)))));
         return;
       case Use::kTf:
       case Use::kTfStatic:
         for (const RosTransform& transform : decode_tf(message.data, message.size)) {
-          const StampedTransform checked = shifted(transform);
-          for (auto& [name, any] : robots_) any->add_transform(checked, to.use == Use::kTfStatic);
+          add_transform(message, shifted(transform), to.use == Use::kTfStatic);
         }
     }
   }
 
-  StampedTransform shifted(const RosTransform& message) const {
-    StampedTransform transform = transform_of(message);
-    transform.stamp_ns += shift_ns_;
-    return transform;
+  /// One of a message's transforms; what is wrong with it costs the others nothing.
+  void add_transform(const RecordedMessage& message, const Checked<StampedTransform>& transform,
+                     bool is_static) {
+    std::optional<InputProblem> problem = transform.problem;
+    if (transform.value) {
+      for (auto& [name, any] : robots_) {  // all are told the same, so one of them may say it
+        const auto found = any->add_transform(*transform.value, is_static);
+        if (found) problem = found;
+      }
+    }
+    say(message, problem);
+  }
+
+  Checked<StampedTransform> shifted(const RosTransform& message) const {
+    return checked_transform({message.header.frame_id, message.child_frame_id,
+                              message.header.stamp_ns + shift_ns_, message.T});
   }
 
   void collect(bool last_call) {
@@ -268,9 +283,25 @@ class RecordingDataset : public DatasetReader {
     }
   }
 
+  std::string about(const RecordedMessage& message, const std::string& problem) const {
+    return file_ + ": " + reader_->channels()[message.channel].topic + " at " +
+           std::to_string(message.log_time_ns) + " ns: " + problem;
+  }
+
   void skip_message(const RecordedMessage& message, const std::string& problem) {
-    skip(file_ + ": " + reader_->channels()[message.channel].topic + " at " +
-         std::to_string(message.log_time_ns) + " ns: " + problem);
+    skip(about(message, problem));
+  }
+
+  /// What was taken in spite of it is no message less.
+  void say(const RecordedMessage& message, const std::optional<InputProblem>& problem) {
+    if (!problem) return;
+    const bool taken = problem->reason == InputReason::kParentChanged ||
+                       problem->reason == InputReason::kStampsRestarted;
+    if (taken) {
+      problems_.push_back(about(message, problem->detail));
+    } else {
+      skip_message(message, problem->detail);
+    }
   }
 
   void report_missing() {
@@ -296,7 +327,6 @@ class RecordingDataset : public DatasetReader {
   std::vector<Feed> feeds_;
   std::size_t reported_ = 0;
   StampNs shift_ns_ = 0;
-  std::optional<StampNs> last_ns_;  // latest depth image of the run so far
   bool ended_ = false;
 };
 

@@ -38,6 +38,10 @@ std::optional<std::array<std::uint8_t, 3>> parse_rgb(const std::string& text) {
   return rgb;
 }
 
+bool ClassMap::fits_a_pixel(int id) const {
+  return std::int64_t{id} * label_divisor + label_divisor - 1 <= 65535;
+}
+
 std::vector<std::string> ClassMap::inconsistencies() const {
   std::vector<std::string> problems;
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -46,6 +50,10 @@ std::vector<std::string> ClassMap::inconsistencies() const {
     if (!list[i].rgb.empty() && !rgb) {
       problems.push_back(entry + ".rgb: \"" + list[i].rgb +
                          "\" is no colour \"r,g,b\" of 0 to 255");
+    }
+    if (!fits_a_pixel(list[i].id)) {
+      problems.push_back(entry + ".id: " + std::to_string(list[i].id) + " with label_divisor " +
+                         std::to_string(label_divisor) + " is beyond the 16 bits of a pixel");
     }
     for (std::size_t j = 0; j < i; ++j) {
       const std::string earlier = "list[" + std::to_string(j) + "]";

@@ -77,6 +77,16 @@ TEST(LoadConfig, BadOverridesAreNamed) {
   EXPECT_EQ(error_of({}, {"noise.=1"}), "--set noise.=1: expected GROUP.KEY=VALUE");
 }
 
+// Not only what is missing: a name too long for the system, and a link that leads to itself.
+TEST(LoadConfig, FilesThatCannotBeReachedAreNamed) {
+  const std::string too_long = std::string(300, 'x') + "/x.yaml";
+  EXPECT_EQ(error_of({too_long}, {}), too_long + ": cannot be read");
+  const TemporaryFile loop("");
+  std::filesystem::remove(loop.path());
+  std::filesystem::create_symlink(loop.path(), loop.path());
+  EXPECT_EQ(error_of({loop.path()}, {}), loop.path().string() + ": cannot be read");
+}
+
 TEST(LoadConfig, RulesBetweenParametersAreChecked) {
   EXPECT_EQ(error_of({}, {"flag=true", "texts=[]"}), "flag needs texts");
 }

@@ -114,8 +114,28 @@ TEST(PcdReader, BadFilesAreSkippedWithAllTheirRepeats) {
   garbage += "DATA binary_compressed\n" + std::string(reinterpret_cast<const char*>(few), 8) +
              "garbage data";
   std::string binary = good.substr(0, good.find("DATA")) + "DATA binary\nshort";
-  const std::string cases[] = {"hello", "",    ascii_pcd(kLabels, false), other_size, no_z, cut,
-                               garbage, binary};
+  // 40 GB by the header of a small file, which would be made room for before the file is read.
+  const auto announcing = [&](const std::string& data) {
+    std::string text = good.substr(0, good.find("DATA"));
+    text.replace(text.find("WIDTH 8"), 7, "WIDTH 16000");
+    text.replace(text.find("HEIGHT 6"), 8, "HEIGHT 16000");
+    return text.replace(text.find("POINTS 48"), 9, "POINTS 256000000") + data;
+  };
+  const std::string compressed(reinterpret_cast<const char*>(few), 8);
+  std::string wide = good;
+  wide.replace(wide.find("WIDTH 8"), 7, "WIDTH 48").replace(wide.find("HEIGHT 6"), 8, "HEIGHT 0");
+  const std::string cases[] = {"hello",
+                               "",
+                               ascii_pcd(kLabels, false),
+                               other_size,
+                               no_z,
+                               cut,
+                               garbage,
+                               binary,
+                               announcing("DATA ascii\n"),
+                               announcing("DATA binary\n"),
+                               announcing("DATA binary_compressed\n" + compressed + "garbage data"),
+                               wide};
   for (std::size_t i = 0; i < std::size(cases); ++i) {
     const ScratchFolder folder;
     folder.write("a.pcd", good);
@@ -128,6 +148,22 @@ TEST(PcdReader, BadFilesAreSkippedWithAllTheirRepeats) {
     ASSERT_EQ(reader->problems().size(), 1u) << i;
     EXPECT_NE(reader->problems()[0].find("b.pcd"), std::string::npos) << reader->problems()[0];
   }
+}
+
+// Four bytes are read of a colour: a field of one would give its neighbours, and bytes beyond the
+// last point.
+TEST(PcdReader, ANarrowColourFieldIsNone) {
+  std::string text = ascii_pcd(kLabels);
+  text.replace(text.find("SIZE 4 4 4 4 4"), 14, "SIZE 4 4 4 4 1");
+  for (std::size_t at = text.find("DATA"); (at = text.find(" 4278", at)) != std::string::npos;) {
+    text.replace(at, text.find('\n', at) - at, " 7");
+  }
+  const ScratchFolder folder;
+  folder.write("a.pcd", text);
+  const auto frame = open_dataset(options_for(folder))->next();
+  ASSERT_TRUE(frame);
+  EXPECT_TRUE(frame->color.empty());
+  EXPECT_EQ(frame->labels.at<std::uint16_t>(3, 4), 2);
 }
 
 TEST(PcdReader, ReadsTheTable) {

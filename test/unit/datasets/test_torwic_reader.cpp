@@ -63,6 +63,33 @@ TEST(TorwicReader, ReadsFramesInNumericOrder) {
   EXPECT_NEAR(frames[0].T_W_C.linear()(2, 2), 0.260, 1e-3);
 }
 
+// SLAM begins at the origin, and converted sets at stamp 0.
+TEST(TorwicReader, PoseOfIdentityAtStampZeroIsAPose) {
+  const ScratchFolder folder;
+  make_sequence(folder);
+  folder.write("poses.txt", "0 0 0 0 0 0 0 0 0 1\n" + pose_line(1) + pose_line(2));
+  const auto reader = open_dataset(options_for(folder));
+  EXPECT_EQ(read_all(*reader).size(), 3u);
+  EXPECT_TRUE(reader->problems().empty()) << reader->problems()[0];
+}
+
+TEST(TorwicReader, FoldersThatCannotBeReadAreNamed) {
+  const ScratchFolder folder;
+  make_sequence(folder);
+  std::filesystem::remove_all(folder / "Segmentation");
+  std::filesystem::create_symlink("Segmentation", folder / "Segmentation");  // leads to itself
+  EXPECT_NE(open_error(options_for(folder)).find("Segmentation: cannot be read: "),
+            std::string::npos)
+      << open_error(options_for(folder));
+  DatasetOptions options = options_for(folder);
+  options.inputs = {folder / "Segmentation"};
+  EXPECT_NE(open_error(options).find("Segmentation: cannot be read: "), std::string::npos)
+      << open_error(options);
+  options.format = "mcap";
+  EXPECT_NE(open_error(options).find("Segmentation: cannot be read: "), std::string::npos)
+      << open_error(options);
+}
+
 TEST(TorwicReader, StitchedInputsGoOn) {
   const ScratchFolder folder;
   make_sequence(folder);
@@ -177,6 +204,22 @@ const Defect kDefects[] = {
        write_image(f.path() / "Segmentation/1.png", cv::Mat(24, 16, CV_8UC1, cv::Scalar(1)));
      },
      "16x24"},
+    {"depth_of_other_size",
+     [](const ScratchFolder& f) { write_image(f.path() / "Depth/1.png", ramp_depth(64, 48)); },
+     "Depth/1.png: image is 64x48, camera is 32x24"},
+    {"depth_announces_gigabytes",
+     [](const ScratchFolder& f) {
+       std::fstream file(f.path() / "Depth/1.png", std::ios::in | std::ios::out);
+       file.seekp(16);
+       file.write("\0\0\x4e\x20\0\0\x4e\x20", 8);  // 20000 x 20000
+     },
+     "image is 20000x20000, more than 16384 a side"},
+    {"depth_is_a_folder",
+     [](const ScratchFolder& f) {
+       std::filesystem::remove(f.path() / "Depth/1.png");
+       std::filesystem::create_directory(f.path() / "Depth/1.png");
+     },
+     "Depth: no image 1"},
 };
 INSTANTIATE_TEST_SUITE_P(Each, TorwicDefect, testing::ValuesIn(kDefects),
                          [](const auto& info) { return std::string(info.param.name); });

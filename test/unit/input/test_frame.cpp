@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "pocd/common/check.hpp"
+#include "pocd/input/message_checks.hpp"
 
 namespace pocd {
 namespace {
@@ -71,6 +72,8 @@ TEST(Frame, ErrorsNameSourceFieldAndValue) {
   mirrored.linear()(2, 2) = -1.0;
   CameraModel no_focal = kCamera;
   no_focal.fx = 0.0;
+  Pose far = Pose::Identity();
+  far.translation().x() = -1.1e6;
   const std::pair<std::string, std::string> cases[] = {
       {error_of([&] { make(small); }), "depth image is 4x2"},
       {error_of([&] { make(cv::Mat()); }), "depth image is 0x0"},
@@ -81,6 +84,7 @@ TEST(Frame, ErrorsNameSourceFieldAndValue) {
       {error_of([&] { make(depth, {}, cv::Mat(3, 3, CV_8UC3)); }), "color image is 3x3"},
       {error_of([&] { make(depth, {}, image(CV_8UC1, 1)); }), "color image has"},
       {error_of([&] { make(depth, {}, {}, nan); }), "not finite"},
+      {error_of([&] { make(depth, {}, {}, far); }), "1100000.000000 m away"},
       {error_of([&] { make(depth, {}, {}, scaled); }), "not orthonormal"},
       {error_of([&] { make(depth, {}, {}, mirrored); }), "not orthonormal"},
       {error_of([&] { make(depth, {}, {}, Pose::Identity(), no_focal); }), "fx = 0"},
@@ -88,6 +92,26 @@ TEST(Frame, ErrorsNameSourceFieldAndValue) {
   for (const auto& [error, expected] : cases) {
     EXPECT_EQ(error.find("topic x"), 0u) << error << " | " << expected;
     EXPECT_NE(error.find(expected), std::string::npos) << error << " | " << expected;
+  }
+}
+
+TEST(Frame, ValidatesOneThatMakeFrameDidNotMake) {
+  const Frame good = make(image(CV_16UC1, 1), image(CV_8UC1, 2), image(CV_8UC3, 3));
+  EXPECT_NO_THROW(validate_frame(good, "f"));
+  const std::pair<std::string, std::function<void(Frame&)>> defects[] = {
+      {"depth image is 0x0", [](Frame& f) { f.depth_m.release(); }},
+      {"depth image has OpenCV type 2", [](Frame& f) { f.depth_m = image(CV_16UC1, 1); }},
+      {"segmentation image is 3x3", [](Frame& f) { f.labels = cv::Mat(3, 3, CV_16UC1); }},
+      {"segmentation image has OpenCV type 0", [](Frame& f) { f.labels = image(CV_8UC1, 1); }},
+      {"color image is 4x2", [](Frame& f) { f.color = cv::Mat(2, 4, CV_8UC3); }},
+      {"color image has OpenCV type 0", [](Frame& f) { f.color = image(CV_8UC1, 1); }},
+      {"pose has a value", [](Frame& f) { f.T_W_C.translation().z() = kNan; }},
+      {"camera cy = ", [](Frame& f) { f.camera.cy = kNan; }},
+  };
+  for (const auto& [expected, spoil] : defects) {
+    Frame frame = good;
+    spoil(frame);
+    EXPECT_EQ(error_of([&] { validate_frame(frame, "f"); }).find("f: " + expected), 0u) << expected;
   }
 }
 
@@ -102,6 +126,10 @@ TEST(Camera, ValidatesEveryField) {
       {"fy", [](CameraModel& c) { c.fy = kInfinity; }},
       {"cx", [](CameraModel& c) { c.cx = kInfinity; }},
       {"cy", [](CameraModel& c) { c.cy = std::nan(""); }},
+      {"fx = 0.190000, not in [0.200000, 400.000000]", [](CameraModel& c) { c.fx = 0.19; }},
+      {"fy", [](CameraModel& c) { c.fy = 301.0; }},
+      {"cx", [](CameraModel& c) { c.cx = 8.1; }},
+      {"cy = -3.100000, not in [-3.000000, 6.000000]", [](CameraModel& c) { c.cy = -3.1; }},
   };
   for (const auto& [field, spoil] : defects) {
     CameraModel camera = kCamera;
@@ -109,6 +137,16 @@ TEST(Camera, ValidatesEveryField) {
     const std::string error = error_of([&] { validate(camera, "c"); });
     EXPECT_NE(error.find(field), std::string::npos) << error;
   }
+}
+
+// A camera info is held to the same bounds: a principal point far away would make a frame cost
+// gigabytes.
+TEST(Camera, InfoWithAnOffPrincipalPointIsRefused) {
+  const auto off = camera_model(640, 360, {461, 0, 1e7, 0, 461, 180, 0, 0, 1});
+  ASSERT_TRUE(off.problem);
+  EXPECT_EQ(off.problem->reason, InputReason::kBadIntrinsics);
+  EXPECT_EQ(off.problem->detail, "camera cx = 10000000.000000, not in [-640.000000, 1280.000000]");
+  EXPECT_TRUE(camera_model(640, 360, {461, 0, 319.5, 0, 461, 180, 0, 0, 1}).value);
 }
 
 TEST(Camera, BackProjectsThroughThePrincipalPoint) {

@@ -24,8 +24,7 @@ class Synchronizer : public ::testing::Test {
   void pose(TimeSynchronizer& sync, StampNs stamp_ns) {
     PoseQuaternion T;
     T.position.x() = static_cast<double>(stamp_ns) * 1e-9;
-    tree_.add("map", "base", stamp_ns, T);
-    sync.pose_seen(stamp_ns);
+    sync.pose_seen(stamp_ns, tree_.add("map", "base", stamp_ns, T));
   }
 
   SynchronizerConfig config_;
@@ -44,8 +43,10 @@ TEST_F(Synchronizer, CompletesAFrameWhicheverStreamComesLast) {
       if (order[i] == 1) sync.add_image(Stream::kSegmentation, 100 * kMs, image(3));
       if (order[i] == 2) sync.add_camera_info(100 * kMs, camera());
       if (order[i] == 3) {
-        tree.add("map", "base", 90 * kMs, PoseQuaternion{{1, 0, 0}, Eigen::Quaterniond::Identity()});
-        tree.add("map", "base", 110 * kMs, PoseQuaternion{{2, 0, 0}, Eigen::Quaterniond::Identity()});
+        tree.add("map", "base", 90 * kMs,
+                 PoseQuaternion{{1, 0, 0}, Eigen::Quaterniond::Identity()});
+        tree.add("map", "base", 110 * kMs,
+                 PoseQuaternion{{2, 0, 0}, Eigen::Quaterniond::Identity()});
       }
     }
     const auto frames = sync.take();
@@ -145,12 +146,83 @@ TEST_F(Synchronizer, PatientOneWaitsHoweverFarOthersRunAhead) {
 
 TEST_F(Synchronizer, RefusesStampsThatJumpBackwards) {
   TimeSynchronizer sync(config_, tree_);
-  EXPECT_TRUE(sync.add_image(Stream::kDepth, 100, image(1)));
   EXPECT_FALSE(sync.add_image(Stream::kDepth, 100, image(1)));
-  EXPECT_FALSE(sync.add_image(Stream::kDepth, 99, image(1)));
-  EXPECT_TRUE(sync.add_camera_info(100, camera()));
-  EXPECT_FALSE(sync.add_camera_info(50, camera()));
+  for (const StampNs stamp_ns : {100, 99}) {
+    const auto problem = sync.add_image(Stream::kDepth, stamp_ns, image(1));
+    ASSERT_TRUE(problem);
+    EXPECT_EQ(problem->reason, InputReason::kStampBackwards);
+    EXPECT_EQ(problem->detail,
+              "stamp " + std::to_string(stamp_ns) + " ns is not after the last one, 100 ns");
+  }
+  EXPECT_FALSE(sync.add_camera_info(100, camera()));
+  EXPECT_TRUE(stamp_refused(sync.add_camera_info(50, camera())));
   EXPECT_EQ(sync.pending(), 1u);
+}
+
+// One stamp of each stream in turn lies in 2038; ten good ones later the frames come again, and the
+// waiting ones are not late for ever.
+TEST_F(Synchronizer, OneStampFarInTheFutureDoesNotMuteAStream) {
+  constexpr StampNs kFar = 2'147'483'647'000 * kMs;
+  for (const bool patient : {false, true}) {
+    for (const Stream bad :
+         {Stream::kDepth, Stream::kSegmentation, Stream::kCameraInfo, Stream::kPose}) {
+      TransformTree tree(1000 * kMs);
+      tree.set_static("base", "camera", PoseQuaternion{});
+      TimeSynchronizer sync(config_, tree);
+      sync.set_patient(patient);
+      int restarts = 0, refusals = 0, complete_late = 0;
+      StampNs last_ns = 0;
+      std::uint64_t depth_added = 0;
+      const auto told = [&](const std::optional<InputProblem>& problem) {
+        refusals += stamp_refused(problem);
+        restarts += problem && problem->reason == InputReason::kStampsRestarted;
+        return !stamp_refused(problem);
+      };
+      for (int i = 1; i <= 60; ++i) {
+        const StampNs stamp_ns = i * 100 * kMs;
+        const auto of = [&](Stream stream) { return i == 20 && stream == bad ? kFar : stamp_ns; };
+        depth_added += told(sync.add_image(Stream::kDepth, of(Stream::kDepth), image(i)));
+        told(sync.add_image(Stream::kSegmentation, of(Stream::kSegmentation), image(i)));
+        told(sync.add_camera_info(of(Stream::kCameraInfo), camera()));
+        const auto problem = tree.add("map", "base", of(Stream::kPose), PoseQuaternion{});
+        told(problem);
+        sync.pose_seen(of(Stream::kPose), problem);
+        for (const SyncedFrame& frame : sync.take()) {
+          EXPECT_GT(frame.stamp_ns, last_ns);
+          last_ns = frame.stamp_ns;
+          complete_late += i > 32 && frame.stamp_ns == stamp_ns && !frame.labels.empty();
+        }
+      }
+      const std::string which = std::to_string(static_cast<int>(bad)) + (patient ? " patient" : "");
+      EXPECT_EQ(complete_late, 28) << which << ": " << sync.waiting_for();
+      EXPECT_EQ(refusals, StampOrder::kAgreeing - 1) << which;
+      EXPECT_EQ(restarts, 1) << which;
+      const SynchronizerCounts& counts = sync.counts();
+      EXPECT_EQ(counts.dropped_restart, bad == Stream::kDepth ? 1u : 0u) << which;
+      EXPECT_EQ(counts.complete + counts.dropped_no_pose + counts.dropped_no_camera_info +
+                    counts.dropped_restart + sync.pending(),
+                depth_added)
+          << which;
+    }
+  }
+}
+
+// A clock that is set back by an hour: every stream starts anew, and the watermark with the depth.
+TEST_F(Synchronizer, AClockThatIsSetBackIsFollowed) {
+  TimeSynchronizer sync(config_, tree_);
+  int frames = 0;
+  StampNs watermark_ns = 0;
+  for (int i = 1; i <= 60; ++i) {
+    const StampNs stamp_ns = (i <= 30 ? 3'600'000 : 0) * kMs + i * 100 * kMs;
+    sync.add_image(Stream::kDepth, stamp_ns, image(i));
+    sync.add_image(Stream::kSegmentation, stamp_ns, image(i));
+    sync.add_camera_info(stamp_ns, camera());
+    pose(sync, stamp_ns);
+    for (const SyncedFrame& frame : sync.take()) frames += i > 42 && frame.stamp_ns == stamp_ns;
+    watermark_ns = stamp_ns;
+  }
+  EXPECT_EQ(frames, 18);
+  EXPECT_EQ(sync.watermark_ns(), watermark_ns);
 }
 
 TEST_F(Synchronizer, UsesTheLastCameraInfoWhenItsOwnIsLate) {
@@ -165,8 +237,8 @@ TEST_F(Synchronizer, UsesTheLastCameraInfoWhenItsOwnIsLate) {
   EXPECT_EQ(frames[0].camera.fx, 123);
 }
 
-// Whatever is lost and however it is interleaved: every depth image is accounted for once, frames come
-// in order, and each has the segmentation of its own stamp.
+// Whatever is lost and however it is interleaved: every depth image is accounted for once, frames
+// come in order, and each has the segmentation of its own stamp.
 TEST_F(Synchronizer, AccountsForEveryFrameUnderRandomLossAndOrder) {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     Random random(seed);
@@ -196,12 +268,11 @@ TEST_F(Synchronizer, AccountsForEveryFrameUnderRandomLossAndOrder) {
       ++next[stream];
       if (random.uniform() < 0.15) continue;  // lost
       const StampNs stamp_ns = index * 50 * kMs;
-      if (stream == 0) depth_added += sync.add_image(Stream::kDepth, stamp_ns, image(index));
+      if (stream == 0) depth_added += !sync.add_image(Stream::kDepth, stamp_ns, image(index));
       if (stream == 1) sync.add_image(Stream::kSegmentation, stamp_ns, image(index));
       if (stream == 2) sync.add_camera_info(stamp_ns, camera());
       if (stream == 3) {
-        tree.add("map", "base", stamp_ns, PoseQuaternion{});
-        sync.pose_seen(stamp_ns);
+        sync.pose_seen(stamp_ns, tree.add("map", "base", stamp_ns, PoseQuaternion{}));
       }
       check(sync.take());
     }

@@ -121,6 +121,14 @@ TEST_F(MapFile, EveryTruncationAndEveryBitFlipIsNoticed) {
   }
 }
 
+TEST_F(MapFile, UnwritableTargetLeavesNothingBehind) {
+  const std::filesystem::path folder = file_.string() + ".folder";
+  std::filesystem::create_directories(folder / "in the way");
+  EXPECT_THROW(save_map(*map_, folder), InputError);
+  EXPECT_FALSE(std::filesystem::exists(folder.string() + ".part"));
+  std::filesystem::remove_all(folder);
+}
+
 TEST_F(MapFile, UnwritableTargetIsNamed) {
   try {
     save_map(*map_, "/nonexistent/folder/map");

@@ -30,7 +30,7 @@ TEST(ResultCsv, EventsReadBack) {
   ObjectEvent removed = moved_event();
   removed.kind = EventKind::kRemoved;
   removed.previous_box.reset();
-  csv.add(removed, "box");
+  csv.add(removed, "box\nof \"steel\"");
   csv.close();
 
   const std::vector<ReportedEvent> events = read_events_csv(file);
@@ -43,6 +43,7 @@ TEST(ResultCsv, EventsReadBack) {
   EXPECT_EQ(*events[0].previous_W, Eigen::Vector3d(0.5, -2.5, 0.75));
   EXPECT_EQ(events[1].kind, EventKind::kRemoved);
   EXPECT_FALSE(events[1].previous_W);
+  EXPECT_EQ(events[1].class_name, "box of \"steel\"") << "a row is a line";
 }
 
 TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
@@ -95,12 +96,21 @@ std::string read_error(const std::string& text) {
 }
 
 TEST(ResultCsv, BadEventFilesAreNamed) {
-  const std::string header = "kind,object_id,class_name,x,y,z,previous_x,previous_y,previous_z,absorbed\n";
+  const std::string header =
+      "kind,object_id,class_name,x,y,z,previous_x,previous_y,previous_z,absorbed\n";
   EXPECT_EQ(read_error(header + "ADDED,1,box,0,0,0,,,,\n"), "no error");
   EXPECT_EQ(read_error(""), "e.csv: cannot be read or is empty");
   EXPECT_EQ(read_error(header + "ADDED,1,box\n"), "e.csv:2: 3 cells, the header has 10");
   EXPECT_EQ(read_error(header + "LOST,1,box,0,0,0,,,,\n"), "e.csv:2: kind \"LOST\" is unknown");
   EXPECT_EQ(read_error(header + "ADDED,1,box,0,0m,0,,,,\n"), "e.csv:2: y \"0m\" is no number");
+  for (const std::string text : {"0x10", "nan", "inf", ""}) {
+    EXPECT_EQ(read_error(header + "ADDED,1,box,0," + text + ",0,,,,\n"),
+              "e.csv:2: y \"" + text + "\" is no number");
+  }
+  for (const std::string id : {"-1", "1.5", "1e20", "4294967296", "nan", ""}) {
+    EXPECT_EQ(read_error(header + "ADDED," + id + ",box,0,0,0,,,,\n"),
+              "e.csv:2: object_id \"" + id + "\" is no whole number of 32 bits");
+  }
   EXPECT_EQ(read_error("kind\nADDED\n"), "e.csv:2: no column object_id");
 }
 

@@ -199,6 +199,62 @@ TEST(PipelineNoChange, FrameOfTheWrongSizeIsAnError) {
   frame = drive.next_frame(furnished());
   frame.depth_m.convertTo(frame.depth_m, CV_16U, 1000.0);
   EXPECT_THROW(drive.process(frame), InputError);
+  frame = drive.next_frame(furnished());
+  frame.labels.convertTo(frame.labels, CV_8U);
+  EXPECT_THROW(drive.process(frame), InputError);
+  frame = drive.next_frame(furnished());
+  frame.labels = frame.labels.rowRange(0, 10).clone();
+  EXPECT_THROW(drive.process(frame), InputError);
+  frame = drive.next_frame(furnished());
+  frame.color = cv::Mat(3, 3, CV_8UC3);
+  EXPECT_THROW(drive.process(frame), InputError);
+}
+
+// What a driver sends before it knows its camera; before and after a good frame.
+TEST(PipelineNoChange, ImageSmallerThanTheStrideIsAnError) {
+  Drive drive;
+  Frame tiny;
+  tiny.robot = "robot1";
+  tiny.camera = {1, 1, 1, 1, 0.5, 0.5};
+  tiny.depth_m = cv::Mat(1, 1, CV_32FC1, cv::Scalar(1));
+  for (int i = 0; i < 2; ++i) {
+    try {
+      drive.process(tiny);
+      FAIL();
+    } catch (const InputError& error) {
+      EXPECT_STREQ(error.what(),
+                   "robot1: frame 0: image is 1x1, smaller than segmentation.stride = 2");
+    }
+    drive.watch(furnished(), 1);
+  }
+}
+
+// A refused frame leaves nothing behind: what follows is as if it had never come.
+TEST(PipelineNoChange, FrameThatTheMapCannotTakeChangesNothing) {
+  PipelineConfig config = test::room_config();
+  config.map.max_depth_m = 30.0;
+  Drive with(config), without(config);
+  for (int i = 0; i < 12; ++i) {
+    Frame frame = with.next_frame(furnished());
+    without.next_frame(furnished());
+    without.process(frame);
+    Frame wide = frame;  // a pyramid with more voxels than are kept track of
+    wide.camera.fx = 0.05 * wide.camera.width;
+    wide.camera.fy = 0.05 * wide.camera.height;
+    Frame far = frame, nowhere = frame;
+    far.T_W_C.translation().y() = 2e6;
+    nowhere.T_W_C.translation().x() = std::nan("");
+    EXPECT_THROW(with.process(wide), InputError);
+    EXPECT_THROW(with.process(far), InputError);
+    EXPECT_THROW(with.process(nowhere), InputError);
+    with.process(frame);
+  }
+  ASSERT_FALSE(without.events().empty());
+  ASSERT_EQ(with.events().size(), without.events().size());
+  for (std::size_t i = 0; i < with.events().size(); ++i) {
+    EXPECT_EQ(with.events()[i].sequence, without.events()[i].sequence);
+    EXPECT_EQ(with.events()[i].object, without.events()[i].object);
+  }
 }
 
 }  // namespace

@@ -174,6 +174,71 @@ TEST(RecordingDataset, BadMessagesCostTheirFrameAndAreNamed) {
   EXPECT_EQ(without_labels, 1);
 }
 
+// Every transform of a message is judged by itself, as on the bus, and told to every robot.
+TEST(RecordingDataset, OneBadTransformCostsTheOthersOfItsMessageNothing) {
+  const TemporaryFolder folder;
+  RecordedRun run(folder / "run.mcap");
+  PoseQuaternion zero;
+  zero.rotation.coeffs().setZero();
+  run.write("/tf_static", kStart - 2000,
+            tf_payload({{"a/camera", "a/lens", 0, zero},
+                        {"a/base", "a/camera", 0, PoseQuaternion{}},
+                        {"b/mast", "b/camera", 0, PoseQuaternion{}}}));
+  run.write(
+      "/tf_static", kStart - 1000,
+      tf_payload({{"b/base", "b/camera", 0, PoseQuaternion{}},  // another parent: said, and used
+                  {"a/camera", "a/camera", 0, PoseQuaternion{}}}));
+  for (int i = 0; i < 5; ++i) {
+    run.write_frame("b", kStart + i * kPeriod);
+    run.write_frame("a", kStart + i * kPeriod + kPeriod / 2);
+  }
+  run.writer().close();
+  const auto reader = open_recorded(options_for({folder / "run.mcap"}));
+  EXPECT_EQ(frames_of(*reader).size(), 10u);
+  ASSERT_EQ(reader->problems().size(), 3u);
+  EXPECT_NE(reader->problems()[0].find("/tf_static at 4999998000 ns: quaternion has length 0"),
+            std::string::npos);
+  EXPECT_NE(reader->problems()[1].find("frame \"b/camera\" had parent \"b/mast\""),
+            std::string::npos);
+  EXPECT_NE(reader->problems()[2].find("are both \"a/camera\""), std::string::npos);
+  EXPECT_EQ(reader->skipped(), 2u);
+}
+
+// The rest of the run is there after one odometry stamp of 2038, and the next run does not begin
+// after one depth image of 2038.
+TEST(RecordingDataset, OneStampFarInTheFutureCostsTenFrames) {
+  const TemporaryFolder folder;
+  constexpr StampNs kFar = 2'147'483'647'000'000'000;
+  RecordedRun run(folder / "run_0.mcap");
+  run.write_mounts(kStart - 1000);
+  for (int i = 0; i < 40; ++i) {
+    run.write_frame("a", kStart + i * kPeriod);
+    if (i == 9) {
+      run.write("/a/odom", kStart + i * kPeriod + 50'000'000,
+                odometry_payload(kFar, "map", "a/base", PoseQuaternion{}));
+    }
+    if (i == 24) {
+      run.write("/a/depth/image_raw", kStart + i * kPeriod + 50'000'000,
+                image_payload(kFar, "a/camera", "16UC1", cv::Mat(6, 8, CV_16UC1, cv::Scalar(1))));
+    }
+  }
+  run.writer().close();
+  write_run(folder / "run_1.mcap", kStart + 40 * kPeriod, 5, true);
+  const auto reader = open_recorded(options_for({folder / "run_0.mcap", folder / "run_1.mcap"}));
+  std::vector<Frame> frames;
+  for (Frame& frame : frames_of(*reader)) {
+    if (frame.robot == "a") frames.push_back(std::move(frame));
+  }
+  // Of the poses ten: the tenth is there only after its image.
+  ASSERT_EQ(frames.size(), 45u - StampOrder::kAgreeing - (StampOrder::kAgreeing - 1));
+  EXPECT_EQ(frames.back().stamp_ns, kStart + 44 * kPeriod + kPeriod / 2);
+  int restarts = 0;
+  for (const std::string& problem : reader->problems()) {
+    restarts += problem.find("starts anew") != std::string::npos;
+  }
+  EXPECT_EQ(restarts, 2);
+}
+
 TEST(RecordingDataset, AsLiveGivesWhatTheComponentTook) {
   const TemporaryFolder folder;
   RecordedRun run(folder / "run.mcap");

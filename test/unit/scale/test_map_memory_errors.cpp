@@ -114,6 +114,28 @@ TEST(MapMemoryErrors, DamagedPagesCostTheirBlocksOnly) {
   EXPECT_GT(same, 0u);
 }
 
+// A region that was lost and filled anew holds nothing of the object that it once held.
+TEST(MapMemoryErrors, LostRegionsAreNobodysAnyMore) {
+  const ScratchFolder folder;
+  TsdfMap map(limited(folder.path().string()));
+  ThreadPool pool(1);
+  for (int i = 0; i <= 67; ++i) {
+    View view = at(0.6 * i);
+    std::fill(view.owners.begin(), view.owners.end(), 7u);
+    map.integrate(view.input(), pool);
+  }
+  ASSERT_EQ(damage_files_in(folder.path().string()), 1);
+  drive(map, 40.0, 0.0);
+  drive(map, 0.0, 40.0);
+  ASSERT_GT(map.memory_status().blocks_lost, 0u);
+  map.clear_object(ObjectId{7});
+  drive(map, 40.0, 0.0);
+  drive(map, 0.0, 40.0);
+  const std::uint64_t returns = map.memory_status().returns;
+  EXPECT_EQ(map.clear_object(ObjectId{7}), 0u);
+  EXPECT_EQ(map.memory_status().returns, returns) << "nothing of it is on disk";
+}
+
 TEST(MapMemoryErrors, PublicationOutlivesADamagedPage) {
   const ScratchFolder folder;
   TsdfMap map(limited(folder.path().string()));

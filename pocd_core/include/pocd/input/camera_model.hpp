@@ -28,8 +28,12 @@ struct CameraModel {
   }
 };
 
-/// Throws InputError, naming `source` and the field, unless sizes are in [1, 16384] and all
-/// intrinsics are finite with fx, fy > 0.
+/// "" or the first field that no camera has, with its value and the rule: sizes are in [1, 16384];
+/// all intrinsics are finite; a focal length is 1/20 to 100 times its side of the image; the
+/// principal point lies at most one image beyond the border. What a frame costs is bounded by that.
+std::string camera_fault(const CameraModel& camera);
+
+/// Throws InputError with `source` and the fault, if there is one.
 void validate(const CameraModel& camera, const std::string& source);
 
 }  // namespace pocd

@@ -20,8 +20,8 @@ struct Frame {
   Pose T_W_C = Pose::Identity();
   /// CV_32FC1 [m]; 0 or NaN = no return. make_frame converts from millimetres.
   cv::Mat depth_m;
-  /// CV_16UC1 class index per pixel (times the label divisor plus instance, if configured), or empty:
-  /// then every pixel has the configured default class.
+  /// CV_16UC1 class index per pixel (times the label divisor plus instance, if configured), or
+  /// empty: then every pixel has the configured default class.
   cv::Mat labels;
   /// CV_8UC3 BGR or empty.
   cv::Mat color;
@@ -30,14 +30,20 @@ struct Frame {
 /// How a depth image codes its values.
 enum class DepthEncoding { kMillimetres16U, kMetres32F };
 
-/// Builds a frame and converts depth to metres: 0, 65535 (16 bit), negative, infinite and NaN become
-/// "no return" (0). Throws InputError, naming `source`, the field and the value, when sizes disagree,
-/// a type is none of the documented ones, the camera is invalid, or the pose is not finite and rigid.
+/// Builds a frame and converts depth to metres: 0, 65535 (16 bit), negative, infinite and NaN
+/// become "no return" (0). Throws InputError, naming `source`, the field and the value, when sizes
+/// disagree, a type is none of the documented ones, the camera is invalid, or the pose is not
+/// finite and rigid.
 Frame make_frame(StampNs stamp_ns, const CameraModel& camera, const Pose& T_W_C,
                  const cv::Mat& depth, const cv::Mat& labels, const cv::Mat& color,
                  const std::string& source);
 
-/// Throws InputError unless T is finite and its rotation orthonormal within 1e-3.
+/// Throws InputError unless T is finite, its rotation orthonormal within 1e-3, and its translation
+/// at most 1000 km: what places are kept in has whole numbers.
 void validate_pose(const Pose& T, const std::string& source);
+
+/// Throws InputError, naming `source`, the field and the value, unless make_frame could have made
+/// the frame; depths are not looked at.
+void validate_frame(const Frame& frame, const std::string& source);
 
 }  // namespace pocd

@@ -40,6 +40,10 @@ class FrameMerger {
 
   void add(const std::string& robot, StampNs stamp_ns, Item item) {
     Robot& entry = robots_[robot];
+    // A robot whose stamps start anew: what waits goes first and holds nothing up.
+    if (stamp_ns < entry.newest_ns) {
+      for (auto& waiting : entry.items) waiting.first = std::min(waiting.first, stamp_ns);
+    }
     entry.items.emplace_back(stamp_ns, std::move(item));
     entry.newest_ns = stamp_ns;
   }

@@ -6,6 +6,7 @@
 
 #include "pocd/common/types.hpp"
 #include "pocd/input/pose_quaternion.hpp"
+#include "pocd/input/stamp_order.hpp"
 
 namespace pocd {
 
@@ -21,9 +22,9 @@ class PoseBuffer {
   /// Both bounds in nanoseconds, > 0; capacity in poses, > 1.
   PoseBuffer(StampNs max_gap_ns, std::size_t capacity);
 
-  /// False, and nothing stored, when `stamp_ns` is older than the newest pose (a stamp that jumped
-  /// backwards). A pose with the newest one's stamp replaces it.
-  bool add(StampNs stamp_ns, const PoseQuaternion& pose);
+  /// kRefused, and nothing stored, when `stamp_ns` is older than the newest pose; kRestarted: the
+  /// poses so far are forgotten. A pose with the newest one's stamp replaces it.
+  StampOrder::Verdict add(StampNs stamp_ns, const PoseQuaternion& pose);
 
   /// The pose at exactly that stamp (bit by bit, where one was stored) or between its neighbours.
   /// Up to `extrapolation_ns` after the newest pose, that newest pose is held.
@@ -39,6 +40,7 @@ class PoseBuffer {
   };
   StampNs max_gap_ns_;
   std::size_t capacity_;
+  StampOrder order_;
   std::deque<Entry> entries_;
 };
 

@@ -14,6 +14,7 @@
 
 #include "pocd/common/types.hpp"
 #include "pocd/input/camera_model.hpp"
+#include "pocd/input/stamp_order.hpp"
 #include "pocd/input/transform_tree.hpp"
 
 namespace pocd {
@@ -57,6 +58,7 @@ struct SynchronizerCounts {
   std::uint64_t dropped_no_camera_info = 0;
   std::uint64_t dropped_no_pose = 0;
   std::uint64_t dropped_overflow = 0;
+  std::uint64_t dropped_restart = 0;   ///< from beyond the stamp at which their stream started anew
   std::uint64_t unmatched_images = 0;  ///< segmentation or colour without a depth image
 };
 
@@ -70,11 +72,13 @@ class TimeSynchronizer {
 
   enum class Stream { kDepth, kSegmentation, kColor, kCameraInfo, kPose };
 
-  /// False, and nothing stored, when the stamp is not after the stream's newest one.
-  bool add_image(Stream stream, StampNs stamp_ns, cv::Mat image);
-  bool add_camera_info(StampNs stamp_ns, const CameraModel& camera);
-  /// Tells how far the pose stream has come, for the bounded wait.
-  void pose_seen(StampNs stamp_ns);
+  /// kStampBackwards, and nothing stored, when the stamp is not after the stream's newest one;
+  /// kStampsRestarted: stored, and what the stream had at this stamp or later is dropped.
+  std::optional<InputProblem> add_image(Stream stream, StampNs stamp_ns, cv::Mat image);
+  std::optional<InputProblem> add_camera_info(StampNs stamp_ns, const CameraModel& camera);
+  /// Tells how far the pose stream has come, for the bounded wait; `problem` is what the transforms
+  /// said of the pose.
+  void pose_seen(StampNs stamp_ns, const std::optional<InputProblem>& problem);
 
   /// Unbounded wait for replay without loss: what a frame lacks is waited for, however far other
   /// streams run ahead.
@@ -97,6 +101,8 @@ class TimeSynchronizer {
   std::size_t pending() const { return depth_.size(); }
   /// No frame with this stamp or an earlier one will come out any more.
   StampNs watermark_ns() const { return watermark_ns_; }
+  /// Newest stamp of a stream of images or camera infos.
+  std::optional<StampNs> newest_ns(Stream stream) const;
   /// The stream that the oldest frame waits for; nothing when there is none or it waits for none.
   std::optional<Stream> blocked_by() const { return blocked_by_; }
   /// Why a frame that was waited for was dropped without pose, the last time since the call before.
@@ -111,13 +117,16 @@ class TimeSynchronizer {
   std::vector<SyncedFrame> run(bool last_call);
   std::optional<cv::Mat> match(std::deque<std::pair<StampNs, cv::Mat>>& stream, StampNs stamp_ns);
   bool camera_at(StampNs stamp_ns, bool settle, CameraModel& camera);
+  std::optional<InputProblem> judge(Stream stream, StampNs stamp_ns);
+  void drop_beyond(Stream stream, StampNs stamp_ns);
+  StampNs horizon_ns() const;
 
   SynchronizerConfig config_;
   const TransformTree& transforms_;
   std::deque<std::pair<StampNs, cv::Mat>> depth_, segmentation_, color_;
   std::deque<std::pair<StampNs, CameraModel>> infos_;
-  std::map<Stream, StampNs> newest_ns_;
-  StampNs horizon_ns_ = std::numeric_limits<StampNs>::min();
+  std::map<Stream, StampOrder> orders_;
+  std::optional<StampNs> newest_pose_ns_;
   StampNs watermark_ns_ = std::numeric_limits<StampNs>::min();
   bool patient_ = false;
   std::optional<Stream> missing_;

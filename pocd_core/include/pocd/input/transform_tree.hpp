@@ -39,7 +39,8 @@ class TransformTree {
   /// that had another parent.
   std::optional<InputProblem> set_static(const std::string& parent, const std::string& child,
                                          const PoseQuaternion& T);
-  /// kStampBackwards: the pose is not stored. kParentChanged: it is, and the child starts anew.
+  /// kStampBackwards: the pose is not stored. kParentChanged, kStampsRestarted: it is, and the
+  /// child starts anew.
   std::optional<InputProblem> add(const std::string& parent, const std::string& child,
                                   StampNs stamp_ns, const PoseQuaternion& T);
 

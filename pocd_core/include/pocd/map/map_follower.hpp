@@ -74,7 +74,6 @@ class MapFollower {
   MapReplica replica_;
   FollowerCounts counts_;
   std::optional<std::uint64_t> published_epoch_;
-  std::optional<std::uint64_t> published_version_;
   bool gap_ = false;
   bool gathering_ = false;
   std::deque<MapDelta> recent_;

@@ -10,7 +10,6 @@
 #include "pocd/common/thread_pool.hpp"
 #include "pocd/common/types.hpp"
 #include "pocd/config/describe.hpp"
-#include "pocd/input/depth_noise.hpp"
 #include "pocd/input/frame.hpp"
 #include "pocd/map/map_memory.hpp"
 #include "pocd/map/voxel_block.hpp"
@@ -80,6 +79,9 @@ class TsdfMap {
   /// surface within a few frames even at full weight). A voxel within the band takes the pixel's
   /// owner; a block left with free space only is dropped. Bit-identical for every thread count.
   void integrate(const IntegrationInput& input, ThreadPool& pool);
+  /// Throws InputError when integrate() could not take the frame, since what it sees holds too many
+  /// voxels or is too far away.
+  void check_view(const Frame& frame) const;
 
   /// Resets exactly the voxels owned by `id` to unknown (weight 0, owner 0), drops blocks that end
   /// empty, returns how many voxels were reset. Cost grows with the object, not with the map.

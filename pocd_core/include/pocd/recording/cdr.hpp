@@ -40,7 +40,6 @@ class CdrReader {
   const std::uint8_t* bytes(std::size_t size);
   void skip(std::size_t size) { bytes(size); }
 
-  bool little_endian() const { return little_endian_; }
   std::size_t remaining() const { return size_ - position_; }
 
  private:
@@ -50,7 +49,6 @@ class CdrReader {
   const std::uint8_t* data_;
   std::size_t size_;
   std::size_t position_ = 4;  // alignment counts from behind the encapsulation header
-  bool little_endian_ = true;
   bool swap_ = false;
 };
 

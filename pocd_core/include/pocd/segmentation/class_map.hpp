@@ -52,8 +52,11 @@ struct ClassMap {
   int stationarity_class(ClassId id) const;
   std::string name(ClassId id) const;  ///< "class_<id>" when not listed
 
+  /// Whether every instance of the class has a value of 16 bits.
+  bool fits_a_pixel(int id) const;
+
   /// Rules between the entries that are broken: an index or a colour listed twice, a colour that is
-  /// none. Checked when a configuration is loaded.
+  /// none, an index that the divisor leaves no value for. Checked when a configuration is loaded.
   std::vector<std::string> inconsistencies() const;
 
   template <class Visitor>
