@@ -10,6 +10,7 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/common/natural_order.hpp"
+#include "pocd/config/config_io.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
 
@@ -25,6 +26,25 @@ DatasetOptions recordings(const std::string& format, const std::vector<fs::path>
   dataset.inputs = inputs;
   return dataset;
 }
+
+/// What `--sim` may change of a scenario: another camera, another robot's noise.
+struct SimChanges {
+  double frame_rate_hz;
+  CameraModel camera;
+  SensorModel sensor;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("frame_rate_hz", frame_rate_hz, Range{0.1, 1000.0}, "Frames of a robot per second.");
+    visit("width", camera.width, Range{16, 4096}, "Image width [px].");
+    visit("height", camera.height, Range{16, 4096}, "Image height [px].");
+    visit("fx", camera.fx, Range{1.0, 1e5}, "Focal length in x [px].");
+    visit("fy", camera.fy, Range{1.0, 1e5}, "Focal length in y [px].");
+    visit("cx", camera.cx, Range{0.0, 4096.0}, "Principal point in x [px].");
+    visit("cy", camera.cy, Range{0.0, 4096.0}, "Principal point in y [px].");
+    visit.group("sensor", sensor, "Errors of depth, masks and poses.");
+  }
+};
 
 /// Counts frames of all runs and says how long the rest takes at the mean speed so far.
 class Progress {
@@ -84,7 +104,7 @@ RouteRunner::RouteRunner(const std::vector<Route>& routes, const RunnerOptions& 
       jobs_.push_back({&route, 0, open_dataset(recordings(options_.dataset, route.files))->size()});
       continue;
     }
-    const std::size_t frames = SimSchedule(load_run(route.files)).frames().size();
+    const std::size_t frames = SimSchedule(scenario_of(route)).frames().size();
     for (const std::uint64_t seed : options_.seeds) jobs_.push_back({&route, seed, frames});
   }
 }
@@ -122,6 +142,16 @@ std::vector<RunScore> RouteRunner::run(const std::vector<MethodSpec>& methods,
   return scores;
 }
 
+Scenario RouteRunner::scenario_of(const Route& route) const {
+  Scenario scenario = load_run(route.files);
+  SimChanges changes{scenario.frame_rate_hz, scenario.camera, scenario.sensor};
+  load_config(changes, {}, options_.sim);
+  scenario.frame_rate_hz = changes.frame_rate_hz;
+  scenario.camera = changes.camera;
+  scenario.sensor = changes.sensor;
+  return scenario;
+}
+
 EvaluationInput RouteRunner::input_of(const Job& job) {
   EvaluationInput input;
   input.route = job.route->name;
@@ -137,7 +167,7 @@ EvaluationInput RouteRunner::input_of(const Job& job) {
     open_recordings(*job.route, input);
     return input;
   }
-  const Scenario scenario = load_run(job.route->files);
+  const Scenario scenario = scenario_of(*job.route);
   input.truth = truth_of(*job.route, scenario);
   input.visit_begin.assign(input.truth->visit_begin.begin(), input.truth->visit_begin.end() - 1);
   SimReaderOptions reader;

@@ -25,6 +25,7 @@ struct RunnerOptions {
   std::string dataset;  ///< of recordings; empty: the simulator
   std::vector<std::uint64_t> seeds = {1};
   std::vector<std::string> faults;
+  std::vector<std::string> sim;  ///< changes of every scenario, KEY=VALUE
   PipelineConfig config;  ///< for depth limit, map voxels, classes
   VoxelMetricsConfig voxels;
   int jobs = 1;
@@ -47,6 +48,7 @@ class RouteRunner {
     std::uint64_t seed;
     std::size_t frames = 0;
   };
+  Scenario scenario_of(const Route& route) const;
   EvaluationInput input_of(const Job& job);
   void open_recordings(const Route& route, EvaluationInput& input) const;
   std::shared_ptr<const SceneTruth> truth_of(const Route& route, const Scenario& scenario);

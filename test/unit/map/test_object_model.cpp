@@ -211,5 +211,26 @@ TEST(ObjectModel, WorksFarFromTheOriginAndBelowIt) {
   }
 }
 
+TEST(ObjectModel, ANoisyLookTakesNoWeightAway) {
+  ObjectModel model(kSpacing_m);
+  for (int k = 0; k < 40; ++k) model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.007f)});
+  const float before = model.surfels()[0].weight;
+  model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.031f)});
+  EXPECT_GE(model.surfels()[0].weight, before);
+}
+
+TEST(ObjectModel, ASurfelThatCreepsIsFoundWhereItIs) {
+  ObjectModel model(kSpacing_m);
+  float z = 0.025f;
+  model.fuse({point(0.02f, 0.02f, z)});
+  // A centimetre a time, two cells and more in all.
+  for (; z < 0.15f; z += 0.01f) {
+    for (int k = 0; k < 30; ++k) model.fuse({point(0.02f, 0.02f, z)});
+  }
+  ASSERT_EQ(model.surfels().size(), 1u) << "a second layer";
+  EXPECT_NEAR(model.surfels()[0].point_W.z(), z, 0.02f);
+  EXPECT_EQ(model.nearest({0.02f, 0.02f, z}, 0.03f), 0);
+}
+
 }  // namespace
 }  // namespace pocd

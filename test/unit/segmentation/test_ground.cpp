@@ -137,5 +137,43 @@ TEST(Ground, DynamicPixelsOfTheBandStayDynamic) {
   EXPECT_EQ(cloud.kind[test::pixel_of(cloud, {0.0, 2.0, 0.04})], PixelKind::kDynamic);
 }
 
+/// A plane through the origin that is tilted about y, of so many pixels.
+PlaneSegmentation tilted_plane(const OrganizedCloud& cloud, int pixels) {
+  PlaneSegmentation planes;
+  planes.plane_of.assign(cloud.size(), PlaneSegmentation::kNoPlane);
+  planes.planes.push_back({{-0.08f, 0.0f, 0.9968f}, 0.0f, {0.0f, 0.0f, 0.0f}, pixels});
+  return planes;
+}
+
+TEST(Ground, AStripHoldsItsTiltForItsOwnFrameOnly) {
+  const PipelineConfig config = test::room_config();
+  GroundModel unused;
+  OrganizedCloud cloud = grounded(test::shoot(with_table(), overview()), config, unused);
+  const int least =
+      static_cast<int>(config.segmentation.ground_min_share * static_cast<double>(cloud.size()));
+  PlaneSegmentation none;
+  none.plane_of.assign(cloud.size(), PlaneSegmentation::kNoPlane);
+  for (const bool strip : {true, false}) {
+    GroundModel ground;
+    ground.update(tilted_plane(cloud, (strip ? 2 : 20) * least), config.segmentation,
+                  config.depth_noise, cloud);
+    EXPECT_NEAR(ground.height_at(4, 0), 0.32f, 0.01f);
+    ground.update(none, config.segmentation, config.depth_noise, cloud);
+    EXPECT_NEAR(ground.height_at(4, 0), strip ? 0.0f : 0.32f, 0.01f);
+  }
+}
+
+TEST(Ground, PixelsOfItsClassGiveTheLevelUntilThereIsAPlane) {
+  const PipelineConfig config = test::room_config();
+  GroundModel unused;
+  OrganizedCloud cloud = grounded(test::shoot(with_table(), overview()), config, unused);
+  PlaneSegmentation none;
+  none.plane_of.assign(cloud.size(), PlaneSegmentation::kNoPlane);
+  GroundModel ground;
+  ground.update(none, config.segmentation, config.depth_noise, cloud);
+  ASSERT_TRUE(ground.known());
+  EXPECT_NEAR(ground.height_at(4, 0), 0.0f, 0.01f);
+}
+
 }  // namespace
 }  // namespace pocd

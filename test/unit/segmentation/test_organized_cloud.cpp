@@ -117,5 +117,21 @@ TEST(Organize, SameForEveryThreadCountAndForReusedMemory) {
   }
 }
 
+TEST(ViewBall, HoldsTheFrustumOfAnUprightAndOffCentreCamera) {
+  OrganizedCloud cloud;
+  cloud.width = 180, cloud.height = 320;
+  cloud.camera = {180, 320, 230.0, 230.0, 30.0, 250.0};
+  cloud.T_W_C.translation() = Eigen::Vector3d(1, 2, 3);
+  const double reach_m = 10.0;
+  const ViewBall ball = view_ball(cloud, reach_m);
+  for (const double u : {0.0, 180.0}) {
+    for (const double v : {0.0, 320.0}) {
+      const Eigen::Vector3d corner_C(reach_m * (u - 30.0) / 230.0, reach_m * (v - 250.0) / 230.0,
+                                     reach_m);
+      EXPECT_LE((cloud.T_W_C * corner_C - ball.center_W).norm(), ball.radius_m + 1e-9);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pocd
