@@ -207,8 +207,13 @@ bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {
     if (waiting() == 0 && (!wanted_ || replies_.matched() == 0)) break;
     if (std::chrono::steady_clock::now() >= end) return false;
   }
-  return deltas_.wait_acknowledged(time) && tiles_.wait_acknowledged(time) &&
-         manifest_.wait_acknowledged(time) && replies_.wait_acknowledged(time);
+  const auto left = [&] {
+    const auto rest = end - std::chrono::steady_clock::now();
+    return std::max(std::chrono::duration_cast<std::chrono::milliseconds>(rest),
+                    std::chrono::milliseconds(0));
+  };
+  return deltas_.wait_acknowledged(left()) && tiles_.wait_acknowledged(left()) &&
+         manifest_.wait_acknowledged(left()) && replies_.wait_acknowledged(left());
 }
 
 std::uint64_t MapPublication::failures() const {
