@@ -40,7 +40,7 @@ failed() {
 }
 
 # From the stamp at which the second lap begins, changes are drawn into the picture.
-pocd_mirror "${bus[@]}" --until-end --timeout 280 --changes-since 14 --output "$output" >"$output/pocd_mirror.log" 2>&1 &
+pocd_mirror "${bus[@]}" --until-end --changes-since 14 --output "$output" >"$output/pocd_mirror.log" 2>&1 &
 mirror=$! && processes+=("$mirror")
 pocd_node "${bus[@]}" --config config/simulated.yaml --robot robot1 --robot robot2 --lossless \
   >"$output/pocd_node.log" 2>&1 &
@@ -48,9 +48,21 @@ node=$! && processes+=("$node")
 
 echo "two robots drive three laps on domain $domain ..."
 pocd_play "${bus[@]}" --dataset sim --input "$scenario" --no-color --lossless --fast \
-  >"$output/pocd_play.log" 2>&1 || failed pocd_play
+  >"$output/pocd_play.log" 2>&1 &
+play=$! && processes+=("$play")
+# The player waits for a node; one that could not start never comes.
+status=0
+wait -n -p ended "$play" "$node" || status=$?
+[[ $ended == "$play" ]] || failed pocd_node
+((status == 0)) || failed pocd_play
 kill -INT "$node"
 wait "$node" || failed pocd_node
+# It ends with the node, unless it has never heard of one.
+for ((tenth = 0; tenth < 600; ++tenth)); do
+  kill -0 "$mirror" 2>/dev/null || break
+  sleep 0.1
+done
+kill -INT "$mirror" 2>/dev/null || true
 wait "$mirror" || failed pocd_mirror
 processes=()
 

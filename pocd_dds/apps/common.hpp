@@ -18,12 +18,15 @@ namespace pocd::dds {
 
 inline std::atomic<bool> stop_requested{false};
 
-/// The first SIGINT, SIGTERM or SIGHUP (its terminal was closed) asks for an orderly end, a second
-/// one ends the process as usual. Who started it with nohup goes on.
+/// The first SIGINT, SIGTERM or SIGHUP (its terminal was closed) asks for an orderly end; the next
+/// SIGINT or SIGTERM ends the process. Who started it with nohup goes on.
 inline void stop_on_signals() {
   struct sigaction action {};
-  action.sa_handler = [](int) { stop_requested = true; };
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  action.sa_handler = [](int) {
+    stop_requested = true;
+    std::signal(SIGINT, SIG_DFL);
+    std::signal(SIGTERM, SIG_DFL);
+  };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   struct sigaction hangup {};

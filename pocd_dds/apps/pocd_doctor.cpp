@@ -39,10 +39,10 @@ Findings check_configuration(const DoctorOptions& options, NodeFile& config) {
     }
     config = NodeFile{};
   }
-  for (const std::string& name : options.robots) {
-    RobotConfig robot;
-    robot.name = name;
-    config.node.robots.push_back(robot);
+  try {
+    config.node.set_robots(options.robots);
+  } catch (const pocd::InputError& error) {
+    findings.push_back({Severity::kError, "configuration", error.what(), "see docs/fleet.md"});
   }
   return findings;
 }
@@ -101,7 +101,8 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--set", options.overrides, "Override one parameter: GROUP.KEY=VALUE")
       ->allow_extra_args(false);
-  app.add_option("--robot", options.robots, "A robot that should be there; repeat it for several")
+  app.add_option("--robot", options.robots,
+                 "A robot that should be there, as for pocd_node; repeat it")
       ->allow_extra_args(false);
   app.add_option("--listen", options.listen_s, "How long to listen to the bus [s]")
       ->check(CLI::Range(0.1, 3600.0))

@@ -29,19 +29,6 @@ constexpr const char* kParametersIntroduction =
     "Written by `pocd_node --parameters`; do not edit. They are given in the same files as the\n"
     "[parameters of the pipeline](parameters.md), under `node`.\n";
 
-/// Robots named on the command line take the place of those of the files.
-void set_robots(const std::vector<std::string>& names, pocd::dds::NodeConfig& node) {
-  if (names.empty()) return;
-  node.robots.clear();
-  for (const std::string& name : names) {
-    pocd::dds::RobotConfig robot;
-    robot.name = name;
-    node.robots.push_back(robot);
-  }
-  const std::vector<std::string> problems = node.inconsistencies();
-  if (!problems.empty()) throw pocd::InputError("--robot: " + problems.front());
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -64,7 +51,9 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--set", overrides, "Override one parameter: GROUP.KEY=VALUE")
       ->allow_extra_args(false);
-  app.add_option("--robot", robots, "A robot's name, {robot} in the topics; repeat it for several")
+  app.add_option("--robot", robots,
+                 "Listen to this robot, {robot} in the topics; one that node.robots has keeps its "
+                 "entry there; repeat it for several")
       ->allow_extra_args(false);
   app.add_flag_callback(
       "--lossless", [&] { overrides.push_back("node.lossless=true"); },
@@ -92,7 +81,7 @@ int main(int argc, char** argv) {
   }
   try {
     pocd::load_config(options.config, files, overrides);
-    set_robots(robots, options.config.node);
+    options.config.node.set_robots(robots);
     if (dump) {
       std::cout << pocd::dump_config(options.config);
       return std::cout.flush() ? 0 : 1;

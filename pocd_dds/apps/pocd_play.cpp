@@ -1,4 +1,6 @@
 // A data set or the simulator on the bus, as robots with cameras would send it.
+#include <set>
+
 #include "apps/common.hpp"
 #include "pocd/config/dataset_options_cli.hpp"
 #include "pocd_dds/play/player.hpp"
@@ -25,13 +27,31 @@ void add_replay_options(CLI::App& app, ReplayOptions& replay, std::vector<std::s
       ->check(CLI::Range(0.0, 1e9));
   add(app.add_option("--duration", replay.duration_s, "Seconds of the recording to play"))
       ->check(CLI::Range(0.0, 1e9));
-  add(app.add_flag("--loop", replay.loop, "Begin again at the end"));
+  add(app.add_flag("--loop", replay.loop,
+                   "Begin again at the end, as a new source: a node goes on with its map"));
   add(app.add_option("--readers", replay.readers, "Readers that each topic waited for needs"))
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add(app.add_option("--wait-for", replay.wait_for,
                      "Pattern of topics whose readers are waited for; default: depth images"))
       ->allow_extra_args(false);
+}
+
+/// Refuses what only concerns data sets. Throws CLI::ValidationError.
+void check_recording_flags(const CLI::App& app) {
+  static const std::set<std::string> both{"--speed",   "--fast",   "--lossless", "--clock",
+                                          "--no-wait", "--domain", "--profiles", "--rate"};
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string name = option->get_name();
+    if (option->count() == 0 || option->get_group() == "Recordings" || both.count(name) > 0 ||
+        option->get_positional()) {
+      continue;
+    }
+    throw CLI::ValidationError(name, "is for data sets, not for recordings");
+  }
+  if (app.count("--rate") > 0 && app.count("--speed") + app.count("--fast") > 0) {
+    throw CLI::ValidationError("--rate", "is --speed for recordings; give one of them");
+  }
 }
 
 /// Throws CLI::ValidationError.
@@ -76,6 +96,8 @@ int main(int argc, char** argv) {
   pocd::add_dataset_options(app, options.dataset);
   app.get_option("--dataset")->required(false);
   app.get_option("--input")->required(false);
+  app.get_option("--rate")->description(
+      "Frames per second of inputs without stamps; of recordings, the multiple of their own speed");
   ReplayOptions replay;
   std::vector<std::string> remap;
   add_replay_options(app, replay, remap);
@@ -104,6 +126,7 @@ int main(int argc, char** argv) {
     if (has_dataset == !replay.inputs.empty()) {
       throw CLI::ValidationError("give either --dataset and --input, or recordings");
     }
+    if (!has_dataset) check_recording_flags(app);
     set_remap(remap, replay);
     // For recordings, --rate is the multiple of the original speed that it is with rosbag2.
     if (!has_dataset && app.count("--rate") > 0) speed = options.dataset.frame_rate_hz;

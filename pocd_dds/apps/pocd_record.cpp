@@ -62,6 +62,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--output", options.output, "File to write; with --split-*, FILE_0000.mcap ...")
       ->required();
+  app.add_flag("--overwrite", options.overwrite, "Replace files that are there already");
   app.add_option("--topic", topics,
                  "Pattern of topics (*, ?, [..]); ROS topics begin with /; default: all; repeat it")
       ->allow_extra_args(false);

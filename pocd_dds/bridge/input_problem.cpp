@@ -4,13 +4,15 @@
 
 namespace pocd::dds {
 
-void ProblemCounter::count(const std::string& topic, const InputProblem& problem,
-                           std::uint64_t times) {
-  Seen& seen = seen_[{topic, problem.reason}];
+void ProblemCounter::count(const std::string& topic, const std::string& reason,
+                           const std::string& detail, std::uint64_t times) {
+  if (times == 0) return;
+  std::pair<std::string, std::string> key{topic, reason};
+  if (seen_.size() >= kMostPairs && seen_.count(key) == 0) key = {"other topics", "more_problems"};
+  Seen& seen = seen_[key];
   if (seen.count == 0) {
-    seen.detail = problem.detail;
-    spdlog::warn("{}: {}: {} (logged once, counted in diagnostics)", topic,
-                 to_string(problem.reason), problem.detail);
+    seen.detail = detail;
+    spdlog::warn("{}: {}: {} (logged once, counted in diagnostics)", topic, reason, detail);
   }
   seen.count += times;
 }
@@ -18,7 +20,7 @@ void ProblemCounter::count(const std::string& topic, const InputProblem& problem
 void ProblemCounter::count_incompatible(RawReader& reader) {
   const std::uint64_t times = reader.take_incompatible();
   if (times == 0) return;
-  Seen& seen = seen_[{reader.topic(), InputReason::kIncompatibleQos}];
+  Seen& seen = seen_[{reader.topic(), to_string(InputReason::kIncompatibleQos)}];
   seen.detail = "a writer does not offer the quality of service that is asked for";
   seen.count += times;
 }
@@ -26,7 +28,7 @@ void ProblemCounter::count_incompatible(RawReader& reader) {
 std::vector<ProblemCounter::Entry> ProblemCounter::entries() const {
   std::vector<Entry> entries;
   for (const auto& [key, seen] : seen_) {
-    entries.push_back({key.first, to_string(key.second), seen.count, seen.detail});
+    entries.push_back({key.first, key.second, seen.count, seen.detail});
   }
   return entries;
 }

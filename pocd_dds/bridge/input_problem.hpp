@@ -11,10 +11,17 @@
 
 namespace pocd::dds {
 
-/// Counts problems by topic and reason; each pair is logged the first time only. Not thread-safe.
+/// Counts problems by topic and reason; each pair is logged the first time only. Topics are named
+/// by peers: beyond `kMostPairs` pairs, all further ones are counted as one. Not thread-safe.
 class ProblemCounter {
  public:
-  void count(const std::string& topic, const InputProblem& problem, std::uint64_t times = 1);
+  static constexpr std::size_t kMostPairs = 200;
+
+  void count(const std::string& topic, const InputProblem& problem, std::uint64_t times = 1) {
+    count(topic, to_string(problem.reason), problem.detail, times);
+  }
+  void count(const std::string& topic, const std::string& reason, const std::string& detail,
+             std::uint64_t times);
 
   /// Writers that the reader cannot hear; it has logged that itself.
   void count_incompatible(RawReader& reader);
@@ -34,7 +41,7 @@ class ProblemCounter {
     std::uint64_t count = 0;
     std::string detail;
   };
-  std::map<std::pair<std::string, InputReason>, Seen> seen_;
+  std::map<std::pair<std::string, std::string>, Seen> seen_;
 };
 
 }  // namespace pocd::dds

@@ -60,10 +60,18 @@ OccupancyProjection::Cells OccupancyProjection::top_view(const Tower& tower) con
 
 bool OccupancyProjection::grow() {
   Tower low = low_, high = high_;
-  for (const Tower& tower : dirty_) {
+  const auto include = [&](const Tower& tower) {
     if (high.first < low.first) low = high = tower;
     low = {std::min(low.first, tower.first), std::min(low.second, tower.second)};
     high = {std::max(high.first, tower.first), std::max(high.second, tower.second)};
+  };
+  if (too_large_ && !dirty_.empty()) {
+    // Whatever made it so may have gone.
+    low = {0, 0};
+    high = {-1, -1};
+    for (const auto& [tower, layers] : towers_) include(tower);
+  } else {
+    for (const Tower& tower : dirty_) include(tower);
   }
   if (low == low_ && high == high_) return false;
   low_ = low;

@@ -33,8 +33,8 @@ struct CellRectangle {
 
 /// One cell per voxel column. Occupied: a surface within the band. Free: within the band free space
 /// was seen, or a floor not far below it, and no surface. Unknown: the rest. The grid grows with
-/// the map and never shrinks, so a cell keeps its place for as long as the size stays. Not
-/// thread-safe.
+/// the map and does not shrink, so a cell keeps its place for as long as the size stays; but one
+/// that became too large begins anew around what there is. Not thread-safe.
 class OccupancyProjection {
  public:
   /// A grid of more cells is no picture any more, and a mistaken far tile must not eat all memory.
@@ -68,7 +68,8 @@ class OccupancyProjection {
   const OccupancyOptions options_;
   std::map<Tower, std::map<std::int32_t, Cells>> towers_;  // by z
   std::set<Tower> dirty_;
-  Tower low_{0, 0}, high_{-1, -1};  // of all towers ever; none at first
+  // Of all towers ever, as long as that is not too large; none at first.
+  Tower low_{0, 0}, high_{-1, -1};
   CellRectangle grid_;
   std::optional<CellRectangle> changed_rectangle_;
   bool too_large_ = false;

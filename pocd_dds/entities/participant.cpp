@@ -80,6 +80,16 @@ void apply(const Delivery& delivery, Qos& qos) {
   qos.data_sharing().off();
 }
 
+/// A profile that says nothing of resource limits has Fast DDS's: 10 instances, beyond which
+/// write() fails. Then the table's hold.
+template <class Qos>
+void lift_limits(const Delivery& delivery, Qos& qos) {
+  if (!(qos.resource_limits() == ResourceLimitsQosPolicy())) return;
+  qos.resource_limits().max_instances = delivery.max_instances;
+  qos.resource_limits().max_samples = delivery.max_samples;
+  qos.resource_limits().max_samples_per_instance = 0;
+}
+
 }  // namespace
 
 int default_domain() {
@@ -98,7 +108,11 @@ struct Participant::Impl {
   Publisher* publisher = nullptr;
   Subscriber* subscriber = nullptr;
   std::mutex mutex;
-  std::map<std::string, Topic*> topics;
+  struct UsedTopic {
+    Topic* topic = nullptr;
+    int users = 0;
+  };
+  std::map<std::string, UsedTopic> topics;
 
   ~Impl() {
     if (participant == nullptr) return;
@@ -164,24 +178,34 @@ Topic* Participant::topic(const std::string& name, TypeSupport type) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   const auto known = impl_->topics.find(name);
   if (known != impl_->topics.end()) {
-    if (known->second->get_type_name() != type.get_type_name()) {
+    if (known->second.topic->get_type_name() != type.get_type_name()) {
       throw InputError("topic " + name + " is used with two types, " +
-                       known->second->get_type_name() + " and " + type.get_type_name());
+                       known->second.topic->get_type_name() + " and " + type.get_type_name());
     }
-    return known->second;
+    ++known->second.users;
+    return known->second.topic;
   }
   if (impl_->participant->find_type(type.get_type_name()).empty()) {
     POCD_CHECK(type.register_type(impl_->participant) == ReturnCode_t::RETCODE_OK);
   }
   Topic* topic = impl_->participant->create_topic(name, type.get_type_name(), TOPIC_QOS_DEFAULT);
   if (topic == nullptr) throw InputError("cannot create topic " + name);
-  impl_->topics.emplace(name, topic);
+  impl_->topics[name] = {topic, 1};
   return topic;
+}
+
+void Participant::release_topic(const std::string& name) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const auto known = impl_->topics.find(name);
+  if (known == impl_->topics.end() || --known->second.users > 0) return;
+  impl_->participant->delete_topic(known->second.topic);
+  impl_->topics.erase(known);
 }
 
 DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& delivery) const {
   DataWriterQos qos = impl_->publisher->get_default_datawriter_qos();
   if (impl_->publisher->get_datawriter_qos_from_profile(topic, qos) == ReturnCode_t::RETCODE_OK) {
+    lift_limits(delivery, qos);
     return qos;
   }
   apply(delivery, qos);
@@ -200,6 +224,7 @@ DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& 
 DataReaderQos Participant::reader_qos(const std::string& topic, const Delivery& delivery) const {
   DataReaderQos qos = impl_->subscriber->get_default_datareader_qos();
   if (impl_->subscriber->get_datareader_qos_from_profile(topic, qos) == ReturnCode_t::RETCODE_OK) {
+    lift_limits(delivery, qos);
     return qos;
   }
   apply(delivery, qos);

@@ -42,6 +42,9 @@ class Participant {
   eprosima::fastdds::dds::Topic* topic(const std::string& name,
                                        eprosima::fastdds::dds::TypeSupport type);
 
+  /// Ends one use of topic(); the topic goes with the last.
+  void release_topic(const std::string& name);
+
   eprosima::fastdds::dds::DataWriterQos writer_qos(const std::string& topic,
                                                    const Delivery& delivery) const;
   eprosima::fastdds::dds::DataReaderQos reader_qos(const std::string& topic,

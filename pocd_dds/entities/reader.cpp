@@ -10,6 +10,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <mutex>
 #include <set>
+#include <utility>
 
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/policy_name.hpp"
@@ -26,6 +27,7 @@ struct RawReader::Impl : DataReaderListener {
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
   std::atomic<std::uint64_t> incompatible{0}, told{0}, lost{0};
+  std::uint64_t damaged = 0;  // by the thread that takes
   std::mutex mutex;
   std::set<SampleMeta::Guid> writers;
 
@@ -49,6 +51,9 @@ struct RawReader::Impl : DataReaderListener {
   void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
     lost += static_cast<std::uint64_t>(status.total_count_change);
   }
+  void on_sample_rejected(DataReader*, const SampleRejectedStatus& status) override {
+    lost += static_cast<std::uint64_t>(status.total_count_change);
+  }
   void on_requested_incompatible_qos(DataReader*,
                                      const RequestedIncompatibleQosStatus& status) override {
     if (incompatible.fetch_add(1) == 0) {
@@ -68,12 +73,16 @@ RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& 
   Participant& owner = *impl_->participant;
   impl_->reader = owner.subscriber()->create_datareader(
       owner.topic(topic_, type), owner.reader_qos(topic_, delivery), impl_.get());
-  if (impl_->reader == nullptr) throw InputError("cannot create a reader of topic " + topic_);
+  if (impl_->reader == nullptr) {
+    owner.release_topic(topic_);
+    throw InputError("cannot create a reader of topic " + topic_);
+  }
 }
 
 RawReader::~RawReader() {
   impl_->reader->set_listener(nullptr);
   impl_->participant->subscriber()->delete_datareader(impl_->reader);
+  impl_->participant->release_topic(topic_);
 }
 
 int RawReader::matched() const { return impl_->matched; }
@@ -89,11 +98,18 @@ std::uint64_t RawReader::take_incompatible() {
 }
 std::uint64_t RawReader::lost() const { return impl_->lost; }
 
+std::uint64_t RawReader::take_damaged() { return std::exchange(impl_->damaged, 0); }
+void RawReader::wake_again() { impl_->wakeup->wake(); }
+
 bool RawReader::take_raw(void* sample, SampleMeta& meta) {
   SampleInfo info;
-  if (impl_->reader->take_next_sample(sample, &info) != ReturnCode_t::RETCODE_OK) return false;
+  const std::uint64_t damaged_before = damaged_payloads();
+  const auto taken = impl_->reader->take_next_sample(sample, &info);
+  impl_->damaged += damaged_payloads() - damaged_before;
+  if (taken != ReturnCode_t::RETCODE_OK) return false;
   meta.valid = info.valid_data;
-  meta.disposed = info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
+  // The state is that of the instance now: of a sample that was followed by a dispose, too.
+  meta.disposed = !info.valid_data && info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
   const eprosima::fastrtps::rtps::octet* key = info.instance_handle.value;
   std::copy(key, key + meta.key.size(), meta.key.begin());
   const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "pocd_dds/entities/guarded_type.hpp"
 #include "pocd_dds/entities/participant.hpp"
 #include "pocd_dds/entities/wakeup.hpp"
 
@@ -17,7 +18,7 @@ struct SampleMeta {
   using Guid = std::array<std::uint8_t, 16>;
   bool valid =
       true;  ///< false: the instance was disposed or lost its writers; no fields but the key
-  bool disposed = false;
+  bool disposed = false;  ///< its instance, with no data; never true of a valid sample
   /// Key of a keyed sample, as the instance handle has it; our keys are 16 bytes and fit as they
   /// are.
   std::array<std::uint8_t, 16> key{};
@@ -48,9 +49,13 @@ class RawReader {
   std::uint64_t take_incompatible();
   /// Samples that the bus says were lost on the way.
   std::uint64_t lost() const;
+  /// Samples that could not be read since the last call; take() leaves them out. From the thread
+  /// that takes.
+  std::uint64_t take_damaged();
 
  protected:
   bool take_raw(void* sample, SampleMeta& meta);
+  void wake_again();
 
  private:
   struct Impl;
@@ -69,10 +74,25 @@ class Reader : public RawReader {
   Reader(std::shared_ptr<Participant> participant, const TopicSpec& spec, const std::string& topic,
          const Delivery& delivery, Wakeup& wakeup)
       : RawReader(std::move(participant), spec, topic,
-                  eprosima::fastdds::dds::TypeSupport(new PubSubType()), delivery, wakeup) {}
+                  eprosima::fastdds::dds::TypeSupport(new GuardedType<PubSubType>()), delivery,
+                  wakeup) {}
 
   /// The oldest sample not taken yet; false when there is none.
   bool take(Sample& sample, SampleMeta& meta) { return take_raw(&sample, meta); }
+
+  /// Calls `use` with the samples that wait, `most` of them; when there may be more, the wake-up
+  /// comes at once. So a peer that sends faster than its samples are used does not hold everybody
+  /// else up.
+  template <class Use>
+  void take_some(int most, Use use) {
+    Sample sample;
+    SampleMeta meta;
+    for (int i = 0; i < most; ++i) {
+      if (!take(sample, meta)) return;
+      use(sample, meta);
+    }
+    wake_again();
+  }
 };
 
 }  // namespace pocd::dds

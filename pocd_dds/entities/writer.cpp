@@ -43,12 +43,16 @@ RawWriter::RawWriter(std::shared_ptr<Participant> participant, const TopicSpec& 
   Participant& owner = *impl_->participant;
   impl_->writer = owner.publisher()->create_datawriter(
       owner.topic(topic_, type), owner.writer_qos(topic_, delivery), impl_.get());
-  if (impl_->writer == nullptr) throw InputError("cannot create a writer of topic " + topic_);
+  if (impl_->writer == nullptr) {
+    owner.release_topic(topic_);
+    throw InputError("cannot create a writer of topic " + topic_);
+  }
 }
 
 RawWriter::~RawWriter() {
   impl_->writer->set_listener(nullptr);
   impl_->participant->publisher()->delete_datawriter(impl_->writer);
+  impl_->participant->release_topic(topic_);
 }
 
 int RawWriter::matched() const { return impl_->matched; }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "pocd_dds/entities/guarded_type.hpp"
 #include "pocd_dds/entities/participant.hpp"
 
 namespace pocd::dds {
@@ -55,7 +56,8 @@ class Writer : public RawWriter {
   Writer(std::shared_ptr<Participant> participant, const TopicSpec& spec, const std::string& topic,
          const Delivery& delivery)
       : RawWriter(std::move(participant), spec, topic,
-                  eprosima::fastdds::dds::TypeSupport(new PubSubType()), delivery) {}
+                  // A participant has one type support of a name, and readers may use this one.
+                  eprosima::fastdds::dds::TypeSupport(new GuardedType<PubSubType>()), delivery) {}
 
   /// False, counted and logged once when Fast DDS refuses.
   bool write(Sample& sample) { return write_raw(&sample); }

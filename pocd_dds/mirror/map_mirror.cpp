@@ -34,6 +34,13 @@ std::array<std::uint8_t, 16> random_id() {
   return id;
 }
 
+/// The table's bound is that of a writer; others may publish their objects on the topic, too.
+dds::Delivery objects_of_all_maps() {
+  dds::Delivery delivery = dds::topics::kObjects.delivery;
+  delivery.max_instances = 0;
+  return delivery;
+}
+
 std::string conflict(std::uint32_t map_id, std::uint64_t followed,
                      const std::vector<std::uint64_t>& rivals) {
   char text[160];
@@ -54,7 +61,8 @@ struct MapMirror::Impl {
         participant(dds::shared_participant({given.domain, given.profiles_file, given.name})),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         deltas(participant, dds::topics::kMapDeltas, wakeup),
-        object_states(participant, dds::topics::kObjects, wakeup),
+        object_states(participant, dds::topics::kObjects, dds::topics::kObjects.name,
+                      objects_of_all_maps(), wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
         plan(given.catch_up),
@@ -170,11 +178,17 @@ void MapMirror::Impl::take_manifests() {
     if (!publishers.heard(meta.writer, message.epoch(), message.final_version(), Clock::now())) {
       continue;
     }
-    if (manifest && manifest->epoch() != message.epoch()) forget_objects_of(manifest->epoch());
+    if (manifest && manifest->epoch() != message.epoch()) {
+      forget_objects_of(manifest->epoch());
+      const auto of_this_run = [&](const auto& key) { return std::get<0>(key) == message.epoch(); };
+      delta_parts.keep(of_this_run);
+      reply_parts.keep(of_this_run);
+    }
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
   }
-  publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); });
+  publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },
+                         Clock::now());
 }
 
 void MapMirror::Impl::take_deltas() {
@@ -244,7 +258,15 @@ void MapMirror::Impl::take_tiles() {
 void MapMirror::Impl::catch_up() {
   const std::pair<std::uint64_t, std::uint64_t> at{follower.replica().epoch().value_or(0),
                                                    follower.replica().version()};
-  if (at != last_at) plan.progress(Clock::now());
+  if (at != last_at) {
+    plan.progress(Clock::now());
+    // What lacks parts and leads no further is not waited for.
+    const auto leads_on = [&](const auto& key) {
+      return std::get<0>(key) != at.first || std::get<1>(key) > at.second;
+    };
+    delta_parts.keep(leads_on);
+    reply_parts.keep(leads_on);
+  }
   last_at = at;
   const bool stale = manifest && !follower.current() && publishers.present();
   const bool hears = replies && replies->matched() > 0;

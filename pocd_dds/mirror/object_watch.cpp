@@ -1,7 +1,11 @@
 #include "pocd_dds/object_watch.hpp"
 
+#include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <map>
+#include <mutex>
+#include <set>
 #include <thread>
 
 #include "mirror/shared_participant.hpp"
@@ -32,6 +36,7 @@ struct ObjectWatch::Impl {
         states(participant, dds::topics::kObjects, dds::topics::kObjects.name, every_sample(),
                wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
+        manifests(participant, dds::topics::kMapManifest, wakeup),
         thread([this] { run(); }) {}
   ~Impl() {
     stopping = true;
@@ -42,6 +47,7 @@ struct ObjectWatch::Impl {
   void run();
   void take_states();
   void take_events();
+  void take_manifests();
   void forget_replaced();
   void gone(const std::array<std::uint8_t, 16>& uuid, Gone why);
 
@@ -55,6 +61,9 @@ struct ObjectWatch::Impl {
   dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> states;
   dds::Reader<pocd_msgs::msg::ObjectEventPubSubType> events;
   std::map<std::array<std::uint8_t, 16>, Known> known;
+  dds::Reader<pocd_msgs::msg::MapManifestPubSubType> manifests;
+  std::mutex mutex;                            // guards publishers
+  std::set<dds::SampleMeta::Guid> publishers;  // writers of this map's manifest, of runs that go on
   std::pair<int, int> matched_before{0, 0};
   std::atomic<bool> stopping{false};
   std::thread thread;
@@ -65,6 +74,7 @@ void ObjectWatch::Impl::run() {
     wakeup.wait_for(kIdle);
     take_states();
     take_events();
+    take_manifests();
   }
 }
 
@@ -114,10 +124,31 @@ void ObjectWatch::Impl::take_events() {
   }
 }
 
+void ObjectWatch::Impl::take_manifests() {
+  pocd_msgs::msg::MapManifest message;
+  dds::SampleMeta meta;
+  while (manifests.take(message, meta)) {
+    if (!meta.valid || message.map_id() != options.map_id) continue;
+    const std::lock_guard<std::mutex> lock(mutex);
+    for (auto writer = publishers.begin(); writer != publishers.end();) {
+      writer = manifests.has_writer(*writer) ? std::next(writer) : publishers.erase(writer);
+    }
+    if (message.final_version()) {
+      publishers.erase(meta.writer);
+    } else {
+      publishers.insert(meta.writer);
+    }
+  }
+}
+
 ObjectWatch::ObjectWatch(const ObjectWatchOptions& options)
     : impl_(std::make_unique<Impl>(options)) {}
 ObjectWatch::~ObjectWatch() = default;
 
-bool ObjectWatch::publisher_present() const { return impl_->states.matched() > 0; }
+bool ObjectWatch::publisher_present() const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return std::any_of(impl_->publishers.begin(), impl_->publishers.end(),
+                     [&](const auto& writer) { return impl_->manifests.has_writer(writer); });
+}
 
 }  // namespace pocd

@@ -21,19 +21,28 @@ class Publishers {
   using Writer = std::array<std::uint8_t, 16>;
   /// Manifests come every second.
   static constexpr std::chrono::milliseconds kSilence{3000};
+  static constexpr std::chrono::milliseconds kMeeting{1000};
 
   /// A manifest has come. True: it is of the one that is followed, perhaps from now on.
   bool heard(const Writer& writer, std::uint64_t epoch, bool final_version, Time now) {
-    claims_[writer] = {epoch, final_version, now};
+    Claim& claim = claims_[writer];
+    claim.epoch = epoch;
+    claim.ended = final_version;
+    claim.heard = now;
     if (followed_ != epoch && followed_ && claims(*followed_, now)) return false;
     followed_ = epoch;
     return true;
   }
-  /// Forgets whose writer has gone; `present` says whether one is there.
+  /// Forgets whose writer has gone; `present` says whether one is there. The bus may tell of a
+  /// writer after its first sample: one that was never there is given some time.
   template <class Present>
-  void forget_gone(const Present& present) {
-    for (auto claim = claims_.begin(); claim != claims_.end();) {
-      claim = present(claim->first) ? std::next(claim) : claims_.erase(claim);
+  void forget_gone(const Present& present, Time now) {
+    for (auto it = claims_.begin(); it != claims_.end();) {
+      Claim& claim = it->second;
+      const bool there = present(it->first);
+      claim.met = claim.met || there;
+      const bool gone = !there && (claim.met || now - claim.heard >= kMeeting);
+      it = gone ? claims_.erase(it) : std::next(it);
     }
   }
 
@@ -63,7 +72,8 @@ class Publishers {
   struct Claim {
     std::uint64_t epoch = 0;
     bool ended = false;
-    Time heard;
+    Time heard{};
+    bool met = false;  // its writer was there
   };
   static bool claims(const Claim& claim, Time now) {
     return !claim.ended && now - claim.heard < kSilence;

@@ -13,6 +13,8 @@ namespace {
 // on the bus: it has no frames in this stretch of the replay.
 constexpr std::size_t kMostBehind = 64;
 constexpr std::size_t kMostDepartures = 16;
+// Whoever announces a depth image is a robot; each takes readers and memory.
+constexpr std::size_t kMostRobots = 200;
 constexpr std::chrono::milliseconds kIdle{100};
 
 StampNs wall_clock_ns() {
@@ -56,11 +58,16 @@ void Intake::stop() {
 }
 
 void Intake::run() {
-  while (!stopping_) {
-    wakeup_.wait_for(kIdle);
-    step(false);
+  try {
+    while (!stopping_) {
+      wakeup_.wait_for(kIdle);
+      step(false);
+    }
+    step(true);
+  } catch (...) {
+    failure_ = std::current_exception();
+    failed_ = true;
   }
-  step(true);
   queue_.close();
 }
 
@@ -98,6 +105,11 @@ void Intake::follow(const std::vector<RosterChange>& changes) {
       departures_.push_back({change.robot, change.reason, wall_clock_ns()});
       if (departures_.size() > kMostDepartures) departures_.pop_front();
       if (known != robots_.end()) known->second.announced = false;
+      continue;
+    }
+    if (known == robots_.end() && robots_.size() >= kMostRobots) {
+      problems_.count(robot_topic(node_.topics.depth, change.robot), "too_many_robots",
+                      "there are " + std::to_string(kMostRobots) + " already: not listened to", 1);
       continue;
     }
     if (known == robots_.end()) {
@@ -147,6 +159,8 @@ bool Intake::see_off(const Robot& robot) {
   if (robot.named || robot.announced || input.live() || !input.settled()) return false;
   merger_.forget(input.name());
   departed_take_cpu_ms_ += input.take_cpu_ms();
+  departed_frames_ += input.frames();
+  departed_dropped_ += input.dropped();
   return true;
 }
 
@@ -169,6 +183,8 @@ void Intake::update_status() {
   IntakeStatus status;
   status.cpu_ms = thread_cpu_ms();
   status.take_cpu_ms = departed_take_cpu_ms_;
+  status.departed_frames = departed_frames_;
+  status.departed_dropped = departed_dropped_;
   for (const auto& [name, robot] : robots_) {
     const RobotInput& input = *robot.input;
     status.take_cpu_ms += input.take_cpu_ms();

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <deque>
+#include <exception>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -38,7 +39,8 @@ struct RobotDeparture {
 
 struct IntakeStatus {
   std::vector<RobotStatus> robots;
-  std::vector<RobotDeparture> departures;  ///< the last few, latest last
+  std::vector<RobotDeparture> departures;                   ///< the last few, latest last
+  std::uint64_t departed_frames = 0, departed_dropped = 0;  ///< of robots that are not listed
   std::vector<ProblemCounter::Entry> problems;
   /// CPU time so far: taking images from the bus and converting them, and all of the thread [ms].
   double take_cpu_ms = 0.0, cpu_ms = 0.0;
@@ -55,6 +57,12 @@ class Intake {
 
   /// Takes what has arrived until now, hands every frame that it makes to the queue, and closes it.
   void stop();
+  /// The thread has ended early; stop() still has to be called, and rethrow() says why.
+  bool failed() const { return failed_; }
+  /// After stop().
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
   /// A frame was taken out of the queue.
   void room_made() { wakeup_.wake(); }
   IntakeStatus status() const;
@@ -92,8 +100,10 @@ class Intake {
   std::map<std::string, Robot> robots_;
   std::deque<RobotDeparture> departures_;
   double departed_take_cpu_ms_ = 0.0;
+  std::uint64_t departed_frames_ = 0, departed_dropped_ = 0;
   FrameMerger<Frame> merger_;
-  std::atomic<bool> stopping_{false};
+  std::atomic<bool> stopping_{false}, failed_{false};
+  std::exception_ptr failure_;
   mutable std::mutex status_mutex_;
   IntakeStatus status_;
   std::thread thread_;

@@ -11,6 +11,7 @@ namespace {
 // few messages.
 constexpr std::size_t kPartBytes = 64 * 1024;
 constexpr std::chrono::seconds kLongestReply{5};
+constexpr int kMostRequests = 100;  // taken in one turn
 constexpr std::chrono::milliseconds kTurn{5};
 
 template <class Message>
@@ -151,15 +152,13 @@ void MapPublication::send_manifest(std::size_t objects, bool final_version) {
 }
 
 void MapPublication::answer_requests() {
-  pocd_msgs::msg::MapSnapshotRequest request;
-  SampleMeta meta;
-  while (requests_.take(request, meta)) {
-    if (!meta.valid || request.map_id() != map_id_) continue;
+  requests_.take_some(kMostRequests, [&](const auto& request, const SampleMeta& meta) {
+    if (!meta.valid || request.map_id() != map_id_) return;
     const bool same_run = request.epoch() == publisher_.epoch();
     const std::uint64_t held = same_run ? request.version() : 0;
     wanted_ = wanted_ ? std::min(*wanted_, held) : held;
     asked_ = std::chrono::steady_clock::now();
-  }
+  });
   if (!wanted_ || reply_waiting_) return;
   // Who asks has a reader of replies; this side may hear of it later, or it has gone again.
   if (replies_.matched() == 0) {
@@ -208,8 +207,13 @@ bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {
     if (waiting() == 0 && (!wanted_ || replies_.matched() == 0)) break;
     if (std::chrono::steady_clock::now() >= end) return false;
   }
-  return deltas_.wait_acknowledged(time) && tiles_.wait_acknowledged(time) &&
-         manifest_.wait_acknowledged(time) && replies_.wait_acknowledged(time);
+  const auto left = [&] {
+    const auto rest = end - std::chrono::steady_clock::now();
+    return std::max(std::chrono::duration_cast<std::chrono::milliseconds>(rest),
+                    std::chrono::milliseconds(0));
+  };
+  return deltas_.wait_acknowledged(left()) && tiles_.wait_acknowledged(left()) &&
+         manifest_.wait_acknowledged(left()) && replies_.wait_acknowledged(left());
 }
 
 std::uint64_t MapPublication::failures() const {

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <functional>
@@ -205,6 +206,9 @@ void Node::Impl::look_for_rivals(IntakeStatus& input) {
 void Node::Impl::send_status(const std::string& state) {
   IntakeStatus input = intake.status();
   look_for_rivals(input);
+  if (outputs.grid_too_large()) {
+    input.problems.push_back({topics::kOccupancy.name, "grid_too_large", 1, ""});
+  }
   const std::lock_guard<std::mutex> lock(mutex);
   counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
   busy_ms = 0.0;
@@ -213,10 +217,11 @@ void Node::Impl::send_status(const std::string& state) {
   counts.intake_cpu_ms = input.cpu_ms;
   counts.take_cpu_ms = input.take_cpu_ms;
   counts.process_cpu_ms = process_cpu_ms();
-  counts.write_failures = objects.failures() + map.failures() + frames.failures();
+  counts.write_failures =
+      objects.failures() + map.failures() + frames.failures() + outputs.failures();
   counts.map = map.traffic();
   counts.objects = objects.objects().size();
-  map.send_manifest(counts.objects, state == "stopped");
+  map.send_manifest(counts.objects, state == "stopped" && map.waiting() == 0);
   status.send(input, counts, queue.size(), queue.dropped(), state, clock.now_ns());
 }
 
@@ -252,18 +257,27 @@ bool Node::Impl::finish() {
   worker.join();
   stop_drawing();
   if (failure) std::rethrow_exception(failure);
+  intake.rethrow();
   const auto wait =
       std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
   // The manifest that says that this was all follows the last delta.
   const auto end = Clock::now() + wait;
   while (map.waiting() > 0 && Clock::now() < end) turn();
+  if (map.waiting() > 0) {
+    spdlog::error("{} messages of the map were not sent within node.shutdown_wait_s",
+                  map.waiting());
+  }
   send_status("stopped");
   send_outputs(true);
   const std::lock_guard<std::mutex> lock(mutex);
   // A late subscriber that asked for a snapshot just now still gets it.
-  const bool acknowledged = objects.wait_acknowledged(wait) && map.wait_acknowledged(wait) &&
-                            frames.wait_acknowledged(wait) && status.wait_acknowledged(wait) &&
-                            outputs.wait_acknowledged(wait);
+  const auto left = [&] {
+    const auto time = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+    return std::max(time, std::chrono::milliseconds(0));
+  };
+  const bool acknowledged = map.waiting() == 0 && objects.wait_acknowledged(left()) &&
+                            map.wait_acknowledged(left()) && frames.wait_acknowledged(left()) &&
+                            status.wait_acknowledged(left()) && outputs.wait_acknowledged(left());
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
   return acknowledged && counts.write_failures == 0;
 }
@@ -277,7 +291,7 @@ Node::~Node() = default;
 
 bool Node::run(const std::atomic<bool>& stop) {
   Impl& node = *impl_;
-  while (!stop && !node.failed) node.turn();
+  while (!stop && !node.failed && !node.intake.failed()) node.turn();
   return node.finish();
 }
 

@@ -30,11 +30,10 @@ class NodeClock {
           .count();
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    rosgraph_msgs::msg::Clock message;
-    SampleMeta meta;
-    while (reader_->take(message, meta)) {
+    constexpr int kMost = 100;  // of one turn
+    reader_->take_some(kMost, [&](const auto& message, const SampleMeta& meta) {
       if (meta.valid) heard_ns_ = to_stamp(message.clock());
-    }
+    });
     return heard_ns_;
   }
 

@@ -4,6 +4,9 @@
 #include <cctype>
 #include <cmath>
 #include <set>
+#include <utility>
+
+#include "pocd/common/check.hpp"
 
 namespace pocd::dds {
 
@@ -28,6 +31,9 @@ void add_topic_problem(const std::string& topic, const std::string& where,
 }  // namespace
 
 std::vector<std::string> MountConfig::inconsistencies() const {
+  const bool plain = x_m == 0.0 && y_m == 0.0 && z_m == 0.0 && qx == 0.0 && qy == 0.0 &&
+                     qz == 0.0 && std::abs(qw) == 1.0;
+  if (!given && !plain) return {"given is false, so the other values would not be used"};
   const double length = std::sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
   if (std::abs(length - 1.0) <= 1e-3) return {};
   return {"qx, qy, qz, qw: the quaternion has length " + std::to_string(length) + ", expected 1"};
@@ -69,6 +75,13 @@ std::vector<std::string> NodeConfig::inconsistencies() const {
     if (!robot.name.empty() && !names.insert(robot.name).second) {
       problems.push_back("robots: the name " + robot.name + " is used twice");
     }
+    if (!robot.color_topic.empty() && color == "absent") {
+      problems.push_back("robots: " + robot.name + " has a color_topic, but color is absent");
+    }
+    if (!robot.segmentation_topic.empty() && segmentation == "absent") {
+      problems.push_back("robots: " + robot.name +
+                         " has a segmentation_topic, but segmentation is absent");
+    }
   }
   for (const std::string& pattern : topics.of_each_robot()) {
     add_topic_problem(pattern, "topics", problems);
@@ -86,6 +99,22 @@ std::vector<std::string> NodeConfig::inconsistencies() const {
     problems.push_back("topics: tf and tf_static must both have {robot}, or neither");
   }
   return problems;
+}
+
+void NodeConfig::set_robots(const std::vector<std::string>& names) {
+  if (names.empty()) return;
+  std::vector<RobotConfig> chosen;
+  for (const std::string& name : names) {
+    const auto known = std::find_if(robots.begin(), robots.end(),
+                                    [&](const RobotConfig& robot) { return robot.name == name; });
+    RobotConfig robot;
+    if (known != robots.end()) robot = *known;
+    robot.name = name;
+    chosen.push_back(robot);
+  }
+  robots = std::move(chosen);
+  const std::vector<std::string> problems = inconsistencies();
+  if (!problems.empty()) throw InputError("--robot: " + problems.front());
 }
 
 }  // namespace pocd::dds

@@ -190,6 +190,10 @@ struct NodeConfig {
   }
   std::vector<std::string> inconsistencies() const;
 
+  /// Makes `names` the robots; one that `robots` has keeps its entry. Without names, nothing
+  /// changes. Throws InputError.
+  void set_robots(const std::vector<std::string>& names);
+
   /// Robots are found on the bus.
   bool discovers() const { return robots.empty() || discover_robots; }
 };

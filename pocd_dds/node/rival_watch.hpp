@@ -21,20 +21,22 @@ class RivalWatch {
   /// Epochs that were not heard before.
   std::vector<std::uint64_t> take() {
     std::vector<std::uint64_t> fresh;
-    pocd_msgs::msg::MapManifest manifest;
-    SampleMeta meta;
-    while (manifests_.take(manifest, meta)) {
+    constexpr int kMost = 100;  // of one turn
+    manifests_.take_some(kMost, [&](const auto& manifest, const SampleMeta& meta) {
       const bool same_map = meta.valid && manifest.map_id() == own_.map_id;
       // One that has ended its run says so for as long as it is there, and is none.
-      if (!same_map || manifest.epoch() == own_.epoch || manifest.final_version()) continue;
+      if (!same_map || manifest.epoch() == own_.epoch || manifest.final_version()) return;
       ++manifests_heard_;
-      if (known_.insert(manifest.epoch()).second) fresh.push_back(manifest.epoch());
-    }
+      if (known_.size() < kMostKnown && known_.insert(manifest.epoch()).second) {
+        fresh.push_back(manifest.epoch());
+      }
+    });
     return fresh;
   }
   std::uint64_t manifests_heard() const { return manifests_heard_; }
 
  private:
+  static constexpr std::size_t kMostKnown = 100;
   const MapRun own_;
   Reader<pocd_msgs::msg::MapManifestPubSubType> manifests_;
   std::set<std::uint64_t> known_;

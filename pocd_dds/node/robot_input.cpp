@@ -12,6 +12,8 @@ namespace {
 // In a replay without loss the reader's history is the buffer that holds the player back.
 constexpr Delivery kLosslessImages{true, false, 0, 8, 0, false, 0};
 constexpr Delivery kLosslessSmall{true, false, 0, 1000, 0, false, 0};
+// Taken in one turn, so that a topic which never stops coming does not hold up the others.
+constexpr int kMostImages = 16, kMostMessages = 1000;
 // Depth images that wait for something; the synchroniser would drop beyond twice as many.
 constexpr std::size_t kHoldDepth = 32;
 
@@ -70,6 +72,7 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
       camera_frame_(robot.camera_frame),
       colours_(colours),
       problems_(problems),
+      wakeup_(wakeup),
       latency_(latency),
       transforms_(nanoseconds(node.max_pose_gap_s), 1000, &shared),
       synchronizer_(synchronizer_config(node, robot), transforms_),
@@ -124,20 +127,18 @@ void RobotInput::drain(bool hold) {
 
 void RobotInput::drain_camera_info() {
   problems_.count_incompatible(camera_info_);
-  sensor_msgs::msg::CameraInfo info;
-  SampleMeta meta;
-  while (camera_info_.take(info, meta)) {
-    if (!meta.valid) continue;
+  camera_info_.take_some(kMostMessages, [&](const auto& info, const SampleMeta& meta) {
+    if (!meta.valid) return;
     heard(Stream::kCameraInfo);
     const Checked<CameraModel> camera = camera_from(info);
     if (camera.problem) {
       problems_.count(camera_info_.topic(), *camera.problem);
-      continue;
+      return;
     }
     const auto problem =
         synchronizer_.add_camera_info(to_stamp(info.header().stamp()), *camera.value);
     if (problem) problems_.count(camera_info_.topic(), *problem);
-    if (problem && problem->reason != InputReason::kStampsRestarted) continue;
+    if (problem && problem->reason != InputReason::kStampsRestarted) return;
     if (camera_ && *camera_ != *camera.value) {
       problems_.count(
           camera_info_.topic(),
@@ -145,27 +146,32 @@ void RobotInput::drain_camera_info() {
                                             ", which is used from here on"});
     }
     camera_ = camera.value;
-  }
+  });
+  count_damaged(camera_info_);
 }
 
 void RobotInput::drain_poses() {
   problems_.count_incompatible(odometry_);
   if (tf_ && tf_->drain(transforms_, problems_)) heard(Stream::kPose);
-  nav_msgs::msg::Odometry message;
-  SampleMeta meta;
-  while (odometry_.take(message, meta)) {
-    if (!meta.valid) continue;
+  odometry_.take_some(kMostMessages, [&](const auto& message, const SampleMeta& meta) {
+    if (!meta.valid) return;
     const Checked<StampedTransform> pose = transform_from(message);
     if (pose.problem) {
       problems_.count(odometry_.topic(), *pose.problem);
-      continue;
+      return;
     }
     heard(Stream::kPose);
     const StampedTransform& T = *pose.value;
     const auto problem = transforms_.add(T.parent, T.child, T.stamp_ns, T.T);
     if (problem) problems_.count(odometry_.topic(), *problem);
     synchronizer_.pose_seen(T.stamp_ns, problem);
-  }
+  });
+  count_damaged(odometry_);
+}
+
+void RobotInput::count_damaged(RawReader& reader) {
+  problems_.count(reader.topic(), "damaged", "a message that cannot be read",
+                  reader.take_damaged());
 }
 
 void RobotInput::drain_images(Stream stream, ImageReader& reader) {
@@ -173,18 +179,21 @@ void RobotInput::drain_images(Stream stream, ImageReader& reader) {
   ImageVisit visit{
       [&](const recording::RosImage& message) { converted = convert(stream, message); }};
   SampleMeta meta;
-  while (true) {
+  // Of a source that has gone there is no more than the reader holds, and all of it is wanted.
+  for (int i = 0; i < kMostImages || source_left_; ++i) {
     const bool enough = stream == Stream::kDepth && synchronizer_.pending() >= kHoldDepth;
     if (lossless_ && enough && !source_left_) return;
     const double before_ms = thread_cpu_ms();
     const bool taken = reader.take(visit, meta);
     take_cpu_ms_ += thread_cpu_ms() - before_ms;
+    count_damaged(reader);
     if (!taken) return;
     if (!meta.valid) continue;
     heard(stream);
     images_ += stream == Stream::kDepth;
     add_image(stream, std::move(converted), meta.received_ns, reader.topic());
   }
+  wakeup_.wake();
 }
 
 RobotInput::ConvertedImage RobotInput::convert(Stream stream,

@@ -75,6 +75,7 @@ class RobotInput {
 
   void drain_poses();
   void drain_camera_info();
+  void count_damaged(RawReader& reader);
   void drain_images(Stream stream, ImageReader& reader);
   /// An image of a stream as the synchroniser takes it, or what is wrong with it.
   struct ConvertedImage {
@@ -99,6 +100,7 @@ class RobotInput {
   std::optional<CameraModel> camera_;  ///< as its source said last
   const ColourTable& colours_;
   ProblemCounter& problems_;
+  Wakeup& wakeup_;
   LatencyLog& latency_;
   TransformTree transforms_;
   TimeSynchronizer synchronizer_;

@@ -124,6 +124,11 @@ bool RosOutputs::wait_acknowledged(std::chrono::milliseconds time) {
          acknowledged(surface_);
 }
 
+std::uint64_t RosOutputs::failures() const {
+  const auto of = [](const auto& writer) { return writer ? writer->failures() : 0; };
+  return of(markers_) + of(grid_) + of(grid_updates_) + of(surface_) + of(obstacles_);
+}
+
 void RosOutputs::send_markers() {
   auto message = marker_array(objects_, marker_departures_.update(objects_), first_markers_,
                               stamp_ns_, config_.node.map_frame);
@@ -145,6 +150,7 @@ void RosOutputs::send_occupancy() {
   projection_.apply(changed, keys.removed);
   const bool was_too_large = projection_.too_large();
   const bool resized = projection_.update();
+  grid_too_large_ = projection_.too_large();
   if (projection_.too_large()) {
     if (!was_too_large) {
       spdlog::warn("{}: a grid of more than {} cells is not published", grid_->topic(),
@@ -160,11 +166,10 @@ void RosOutputs::send_occupancy() {
   if (resized || (grid_outdated_ && (readers != grid_readers_ || last_))) {
     auto message = grid_message(projection_.grid(), config_.pipeline.map.voxel_size_m, stamp_ns_,
                                 config_.node.map_frame);
-    grid_->write(message);
-    grid_outdated_ = false;
+    grid_outdated_ = !grid_->write(message);
   } else if (rectangle) {
     auto message = grid_update_message(*rectangle, stamp_ns_, config_.node.map_frame);
-    grid_updates_->write(message);
+    if (!grid_updates_->write(message)) grid_outdated_ = true;
   }
   grid_readers_ = readers;
 }

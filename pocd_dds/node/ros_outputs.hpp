@@ -2,6 +2,7 @@
 // obstacles.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
@@ -39,6 +40,9 @@ class RosOutputs {
   void send();
   /// Of the topics that keep their last state.
   bool wait_acknowledged(std::chrono::milliseconds time);
+  std::uint64_t failures() const;
+  /// The grid is not published: tiles are too far apart. Thread-safe.
+  bool grid_too_large() const { return grid_too_large_; }
 
  private:
   void send_markers();
@@ -70,6 +74,7 @@ class RosOutputs {
   bool first_markers_ = true;
   Departures marker_departures_, obstacle_departures_;
   OccupancyProjection projection_;
+  std::atomic<bool> grid_too_large_{false};
   int grid_readers_ = 0;  // ever matched when the last whole grid was sent
   bool grid_outdated_ = false;
   SurfacePoints points_;

@@ -105,7 +105,9 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   diagnostic_msgs::msg::DiagnosticArray diagnostics;
   diagnostics.header().stamp(to_time(now_ns));
   auto node = status_of(health.level(), name_, health.message());
-  std::uint64_t received = 0, dropped = queue_dropped;
+  // Sums only grow: alarms look at how fast.
+  std::uint64_t received = intake.departed_frames;
+  std::uint64_t dropped = queue_dropped + intake.departed_dropped;
   for (const RobotStatus& robot : intake.robots) {
     received += robot.frames;
     dropped += robot.dropped;

@@ -3,6 +3,12 @@
 #include "pocd_dds/bridge/conversions.hpp"
 
 namespace pocd::dds {
+namespace {
+
+constexpr int kMostMessages = 1000;  // taken in one turn
+constexpr const char* kDamaged = "a message that cannot be read";
+
+}  // namespace
 
 TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
                                const std::string& tf_topic, const std::string& tf_static_topic,
@@ -18,12 +24,10 @@ bool TransformInput::drain(TransformTree& tree, ProblemCounter& problems) {
 
 bool TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree,
                            ProblemCounter& problems) {
-  tf2_msgs::msg::TFMessage message;
-  SampleMeta meta;
   bool any = false;
   problems.count_incompatible(reader);
-  while (reader.take(message, meta)) {
-    if (!meta.valid) continue;
+  reader.take_some(kMostMessages, [&](const auto& message, const SampleMeta& meta) {
+    if (!meta.valid) return;
     for (const auto& entry : message.transforms()) {
       const Checked<StampedTransform> transform = transform_from(entry);
       if (!transform.value) {
@@ -36,7 +40,8 @@ bool TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree
           is_static ? tree.set_static(parent, child, T) : tree.add(parent, child, stamp_ns, T);
       if (problem) problems.count(reader.topic(), *problem);
     }
-  }
+  });
+  problems.count(reader.topic(), "damaged", kDamaged, reader.take_damaged());
   return any;
 }
 

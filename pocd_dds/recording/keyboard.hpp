@@ -7,17 +7,23 @@
 
 namespace pocd::dds {
 
-/// Puts the terminal back as it was when it goes. Without a terminal it never has a key.
+/// Puts the terminal back as it was when it goes. Without a terminal, or in the background, it
+/// never has a key.
 class Keyboard {
  public:
   explicit Keyboard(bool enabled) {
-    if (!enabled || isatty(STDIN_FILENO) == 0 || tcgetattr(STDIN_FILENO, &before_) != 0) return;
+    // In the background, a change of the terminal would stop the process.
+    if (!enabled || tcgetpgrp(STDIN_FILENO) != getpgrp()) return;
+    if (tcgetattr(STDIN_FILENO, &before_) != 0) return;
     termios raw = before_;
     raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // signals stay as they are
     active_ = tcsetattr(STDIN_FILENO, TCSANOW, &raw) == 0;
   }
-  ~Keyboard() {
+  ~Keyboard() { release(); }
+  /// Puts the terminal back already now.
+  void release() {
     if (active_) tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+    active_ = false;
   }
   Keyboard(const Keyboard&) = delete;
   Keyboard& operator=(const Keyboard&) = delete;

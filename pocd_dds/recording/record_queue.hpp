@@ -1,6 +1,7 @@
 // Samples between the threads that receive and the one that writes.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -14,9 +15,22 @@
 
 namespace pocd::dds {
 
+/// A writer, or an instance of a keyed topic.
+using LatchKey = std::array<std::uint8_t, 16>;
+
+/// What a sample of a latched topic is to those who join later.
+struct Latch {
+  enum class Part { kSample, kInstance, kGone };
+  std::uint16_t channel = 0;  ///< of the topic's samples, for all parts
+  LatchKey source{};
+  bool keyed = false;
+  Part part = Part::kSample;
+};
+
 struct QueuedSample {
   recording::MessageHeader header;
   recording::Bytes payload;
+  std::optional<Latch> latch;
 };
 
 /// Bounded in bytes. Buffers that were written come back: large ones are costly to get from the

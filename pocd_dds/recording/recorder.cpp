@@ -15,6 +15,7 @@
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/wakeup.hpp"
 #include "pocd_dds/recording/discovery.hpp"
+#include "pocd_dds/recording/latched_samples.hpp"
 #include "pocd_dds/recording/record_queue.hpp"
 
 namespace pocd::dds {
@@ -35,6 +36,16 @@ std::uint64_t now_ns() {
                                         .count());
 }
 
+/// The file, when no recording is lost by it.
+const std::filesystem::path& checked(const RecorderOptions& options) {
+  if (options.overwrite) return options.output;
+  for (const std::filesystem::path& file :
+       recording::SplitWriter::existing(options.output, options.split)) {
+    throw InputError(file.string() + " exists already; --overwrite replaces it");
+  }
+  return options.output;
+}
+
 struct Counts {
   std::atomic<std::uint64_t> messages{0}, bytes{0}, lost{0};
 };
@@ -43,12 +54,13 @@ struct Counts {
 class Tap : public DataReaderListener {
  public:
   Tap(RecordQueue& queue, Counts& counts, std::uint16_t channel,
-      std::optional<std::uint16_t> instances, bool keys_known)
+      std::optional<std::uint16_t> instances, bool keys_known, bool latched)
       : queue_(queue),
         counts_(counts),
         channel_(channel),
         instances_(instances),
-        keys_known_(keys_known) {}
+        keys_known_(keys_known),
+        latched_(latched) {}
 
   void on_data_available(DataReader* reader) override {
     SampleInfo info;
@@ -84,14 +96,26 @@ class Tap : public DataReaderListener {
     if (instances_ && !keys_known_) push_instance(header, InstanceChange::kWritten, key);
     ++counts_.messages;
     counts_.bytes += sample_.payload.size();
-    queue_.push({header, std::move(sample_.payload)});
+    LatchKey source = key;
+    if (!instances_) {
+      const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
+      std::copy_n(writer, source.size(), source.begin());
+    }
+    queue_.push({header, std::move(sample_.payload), latch(source, Latch::Part::kSample)});
     sample_.payload = {};
+  }
+
+  std::optional<Latch> latch(const LatchKey& source, Latch::Part part) const {
+    if (!latched_) return std::nullopt;
+    return Latch{channel_, source, instances_.has_value(), part};
   }
 
   void push_instance(recording::MessageHeader header, InstanceChange change,
                      const InstanceKey& key) {
     header.channel = *instances_;
-    queue_.push({header, instance_payload(change, key)});
+    const bool written = change == InstanceChange::kWritten;
+    queue_.push({header, instance_payload(change, key),
+                 latch(key, written ? Latch::Part::kInstance : Latch::Part::kGone)});
   }
 
   RecordQueue& queue_;
@@ -99,6 +123,7 @@ class Tap : public DataReaderListener {
   const std::uint16_t channel_;
   const std::optional<std::uint16_t> instances_;
   const bool keys_known_;
+  const bool latched_;  // late joiners get the last samples, and so do later files
   RawSample sample_;
 };
 
@@ -108,7 +133,7 @@ struct Recorder::Impl {
   explicit Impl(const RecorderOptions& recorder_options)
       : options(recorder_options),
         queue(options.queue_bytes),
-        writer(options.output, options.split),
+        writer(checked(options), options.split),
         discovery([this] { wakeup.wake(); }) {
     BusOptions bus = options.bus;
     bus.listener = &discovery;
@@ -233,7 +258,8 @@ void Recorder::Impl::open_reader(Line& line) {
     qos.expects_inline_qos(topic.keyed);
     if (topic.exclusive) qos.ownership().kind = EXCLUSIVE_OWNERSHIP_QOS;
     line.tap =
-        std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key));
+        std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key),
+                              topic.transient_local && options.split.splits());
     line.reader = line.subscriber->create_datareader(dds_topic, qos, line.tap.get());
     if (line.reader == nullptr) throw InputError("cannot create a reader");
   } catch (const InputError& error) {
@@ -262,12 +288,19 @@ void Recorder::Impl::write_all() {
   using Clock = std::chrono::steady_clock;
   auto flushed = Clock::now();
   const auto period = std::chrono::duration<double>(options.flush_period_s);
+  LatchedSamples latched;
+  writer.set_head([&](const recording::SplitWriter::Write& write) {
+    latched.write_all([&](const QueuedSample& sample) {
+      write(sample.header, sample.payload.data(), sample.payload.size());
+    });
+  });
   try {
     while (!queue.finished()) {
       std::optional<QueuedSample> sample = queue.pop(std::chrono::milliseconds(100));
       const std::lock_guard<std::mutex> lock(writer_mutex);
       if (sample) {
         writer.write(sample->header, sample->payload.data(), sample->payload.size());
+        latched.note(*sample);
         queue.give_back(std::move(sample->payload));
       }
       if (Clock::now() - flushed >= period) {

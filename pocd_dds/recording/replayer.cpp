@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 #include <thread>
 
 #include "pocd/common/check.hpp"
@@ -22,6 +23,8 @@ using recording::RecordedMessage;
 using recording::RecordingReader;
 constexpr std::chrono::milliseconds kPoll{20};
 constexpr std::chrono::milliseconds kLastAcknowledgement{30000};
+// Long enough for a busy subscriber to see that the writers of the round before have gone.
+constexpr std::chrono::seconds kBetweenRounds{1};
 
 /// Where the messages of one channel go.
 struct Route {
@@ -59,6 +62,8 @@ struct Replayer::Impl {
 
   void add_channel(const RecordedChannel& channel);
   void make_writers();
+  void next_round(const std::atomic<bool>& stop);
+  void refuse_typos(const std::vector<RecordedTopic>& recorded) const;
   bool selected(const RecordedTopic& topic) const;
   RecordedTopic renamed(RecordedTopic topic) const;
   Route route_of(const RecordedChannel& channel) const;
@@ -97,10 +102,15 @@ Replayer::Impl::Impl(const ReplayOptions& replay_options)
   }
   if (files.empty()) throw InputError("no recording given");
   bool first = true;
+  std::vector<RecordedTopic> recorded;
   for (const auto& file : files) {
     const auto reader = recording::open_recording(file);
     for (const std::string& problem : reader->problems()) spdlog::warn("{}", problem);
-    for (const RecordedChannel& channel : reader->channels()) add_channel(channel);
+    for (const RecordedChannel& channel : reader->channels()) {
+      add_channel(channel);
+      const std::optional<RecordedTopic> topic = topic_of(channel);
+      if (topic && instances_of(channel).empty()) recorded.push_back(*topic);
+    }
     if (first && reader->info().messages > 0) {
       start_ns = reader->info().start_ns;
       first = false;
@@ -109,12 +119,49 @@ Replayer::Impl::Impl(const ReplayOptions& replay_options)
   if (topics.empty()) {
     throw InputError(files.front().string() + ": holds no topic that matches and can be played");
   }
+  refuse_typos(recorded);
   participant = std::make_shared<Participant>(options.bus);
   if (options.clock && topics.count({"rt/clock", {}}) == 0) {
     clock =
         std::make_unique<Writer<rosgraph_msgs::msg::ClockPubSubType>>(participant, topics::kClock);
   }
   make_writers();
+}
+
+/// A pattern that matches nothing is a mistake that would show in the map only.
+void Replayer::Impl::refuse_typos(const std::vector<RecordedTopic>& recorded) const {
+  const auto names = [&](const auto& list, const auto& name_of) {
+    std::set<std::string> unique;
+    for (const auto& entry : list) unique.insert(name_of(entry));
+    std::string text;
+    for (const std::string& name : unique) text += (text.empty() ? "" : ", ") + name;
+    return text;
+  };
+  const auto of_topic = [](const RecordedTopic& topic) { return recorded_name(topic.name); };
+  const auto of_entry = [](const auto& entry) { return recorded_name(entry.second.name); };
+  for (const auto& [from, to] : options.remap) {
+    const bool known =
+        std::any_of(topics.begin(), topics.end(),
+                    [&, name = from](const auto& topic) { return of_entry(topic) == name; });
+    if (known) continue;
+    throw InputError("--remap " + from + ": no such topic is played, only " +
+                     names(topics, of_entry));
+  }
+  for (const std::string& pattern : options.wait_for) {
+    const bool known = std::any_of(topics.begin(), topics.end(), [&](const auto& topic) {
+      return topic_matches(pattern, topic.second);
+    });
+    if (known) continue;
+    throw InputError("--wait-for " + pattern + ": matches no topic that is played, only " +
+                     names(topics, of_entry));
+  }
+  for (const std::string& pattern : options.topics) {
+    const bool known = std::any_of(recorded.begin(), recorded.end(), [&](const auto& topic) {
+      return topic_matches(pattern, topic);
+    });
+    if (known) continue;
+    throw InputError("--topics " + pattern + ": matches none of " + names(recorded, of_topic));
+  }
 }
 
 bool Replayer::Impl::selected(const RecordedTopic& topic) const {
@@ -316,16 +363,32 @@ void Replayer::Impl::play_pass(const std::atomic<bool>& stop) {
   }
 }
 
+/// Stamps go back to the beginning, which subscribers take of a new source only.
+void Replayer::Impl::next_round(const std::atomic<bool>& stop) {
+  for (const auto& [key, writer] : writers) {
+    const bool reliable = options.lossless || writer->topic().reliable;
+    if (reliable) acknowledged(*writer, stop, Clock::now() + kLastAcknowledgement);
+  }
+  writers.clear();
+  const auto until = Clock::now() + kBetweenRounds;
+  while (!stop && Clock::now() < until) std::this_thread::sleep_for(kPoll);
+  make_writers();
+  if (options.wait_for_readers) wait_for_readers(stop);
+}
+
 Replayer::Replayer(const ReplayOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 Replayer::~Replayer() = default;
 
 ReplayResult Replayer::run(const std::atomic<bool>& stop) {
   Impl& replay = *impl_;
   if (!replay.options.wait_for_readers || replay.wait_for_readers(stop)) {
-    do {
+    replay.play_pass(stop);
+    while (replay.options.loop && !stop && replay.result.messages > 0) {
+      replay.next_round(stop);
       replay.play_pass(stop);
-    } while (replay.options.loop && !stop && replay.result.messages > 0);
+    }
   }
+  replay.keyboard.release();  // a second signal would not
   replay.result.stopped = stop;
   const auto deadline = Clock::now() + kLastAcknowledgement;
   for (const auto& [key, writer] : replay.writers) {

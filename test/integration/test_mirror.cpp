@@ -100,23 +100,65 @@ TEST(ObjectWatch, ObjectsGoWhenRemovedOrReplacedAndNotWithTheirNode) {
     return state;
   };
   using Objects = dds::Writer<pocd_msgs::msg::ObjectStatePubSubType>;
+  using Manifests = dds::Writer<pocd_msgs::msg::MapManifestPubSubType>;
+  const auto announce = [](Manifests& manifests, const dds::MapRun& run) {
+    pocd_msgs::msg::MapManifest manifest;
+    manifest.map_id(run.map_id);
+    manifest.epoch(run.epoch);
+    EXPECT_TRUE(manifests.write(manifest));
+  };
+  // A node of another map is there all the time.
+  const auto beside = test_participant(domain);
+  Objects others(beside, dds::topics::kObjects);
+  Manifests other_manifests(beside, dds::topics::kMapManifest);
+  announce(other_manifests, {4, 8});
+  write(others, {4, 8}, 50);
+  auto manifests = std::make_unique<Manifests>(test_participant(domain), dds::topics::kMapManifest);
   auto first = std::make_unique<Objects>(test_participant(domain), dds::topics::kObjects);
-  write(*first, {4, 1}, 50);  // of another map
+  announce(*manifests, {3, 1});
   for (const std::uint32_t id : {1, 2}) write(*first, {3, 1}, id);
   auto state = write(*first, {3, 1}, 3);
   ASSERT_TRUE(eventually([&] { return count() == 3; }));
-  EXPECT_TRUE(watch.publisher_present());
+  EXPECT_TRUE(eventually([&] { return watch.publisher_present(); }));
   EXPECT_TRUE(first->dispose(state));
   ASSERT_TRUE(eventually([&] { return count() == 2; }));
   first.reset();
+  manifests.reset();
   ASSERT_TRUE(eventually([&] { return !watch.publisher_present(); }));
   Objects second(test_participant(domain), dds::topics::kObjects);
+  manifests = std::make_unique<Manifests>(test_participant(domain), dds::topics::kMapManifest);
+  announce(*manifests, {3, 2});
   ASSERT_TRUE(eventually([&] { return watch.publisher_present(); }));
   EXPECT_EQ(count(), 2u) << "nobody has seen that the places are free";
   write(second, {3, 2}, 9);
   ASSERT_TRUE(eventually([&] { return count() == 1; }));
   const std::lock_guard<std::mutex> lock(mutex);
   EXPECT_EQ(said, (std::vector<std::string>{"removed 3", "replaced 1", "replaced 2"}));
+}
+
+// With both waiting, the state of the instance is that of the last.
+TEST(Reader, AStateBeforeADisposeIsAState) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Wakeup wakeup;
+  dds::Delivery every = dds::topics::kObjects.delivery;
+  every.keep_last = 0;
+  every.max_instances = 0;
+  dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> reader(
+      bus, dds::topics::kObjects, dds::topics::kObjects.name, every, wakeup);
+  dds::Writer<pocd_msgs::msg::ObjectStatePubSubType> writer(bus, dds::topics::kObjects);
+  ASSERT_TRUE(eventually([&] { return writer.matched() > 0; }));
+  auto state = dds::object_message(ObjectSnapshot{}, {3, 1}, ClassMap{}, 1, "map");
+  EXPECT_TRUE(writer.write(state));
+  EXPECT_TRUE(writer.dispose(state));
+  ASSERT_TRUE(writer.wait_acknowledged(kGenerous));
+  dds::SampleMeta meta;
+  ASSERT_TRUE(reader.take(state, meta));
+  EXPECT_TRUE(meta.valid);
+  EXPECT_FALSE(meta.disposed);
+  ASSERT_TRUE(reader.take(state, meta));
+  EXPECT_FALSE(meta.valid);
+  EXPECT_TRUE(meta.disposed);
 }
 
 TEST(Mirror, WithoutAPublisherItSaysSo) {

@@ -56,6 +56,24 @@ TEST(Node, UsageErrorsAreOneLineAndExitCode2) {
       << "the likely intended key is named";
 }
 
+TEST(Node, ARobotOfTheCommandLineKeepsItsEntryInTheFile) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "robots.yaml";
+  const auto dump = [&](const std::string& entry) {
+    std::ofstream(file) << "node:\n  robots:\n    - {name: robot1, " << entry << "}\n";
+    return run_command({bin("pocd_node"), "--config", file.string(), "--robot", "robot1", "--robot",
+                        "robot2", "--dump"});
+  };
+  const CommandResult kept = dump("depth_topic: rt/front/depth, mount: {given: true, x_m: 0.3}");
+  EXPECT_EQ(kept.exit_code, 0) << kept.err;
+  EXPECT_NE(kept.out.find("rt/front/depth"), std::string::npos) << kept.out;
+  EXPECT_NE(kept.out.find("robot2"), std::string::npos) << kept.out;
+  const CommandResult unused = dump("mount: {x_m: 0.3}");
+  EXPECT_EQ(unused.exit_code, 2) << "a mount that would not be used";
+  EXPECT_NE(unused.err.find("given is false"), std::string::npos) << unused.err;
+  EXPECT_EQ(dump("color_topic: rt/front/color").exit_code, 2) << "colour is absent";
+}
+
 TEST(Commands, HelpShowsAnExample) {
   for (const char* command :
        {"pocd_node", "pocd_play", "pocd_mirror", "pocd_health", "pocd_doctor"}) {

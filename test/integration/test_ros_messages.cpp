@@ -125,12 +125,17 @@ TEST(OccupancyProjection, GrowsAndNeverShrinks) {
 TEST(OccupancyProjection, FarTileDoesNotEatAllMemory) {
   SmallMap map;
   map.set(0, 0, 5, 0.02);
-  map.set(10'000'000, 10'000'000, 5, 0.02);
+  map.set(10'000'000, 10'000'000, 5, 0.02, 7);
   OccupancyProjection projection(options());
   map.publish_to(projection);
   EXPECT_TRUE(projection.update());
   EXPECT_TRUE(projection.too_large());
   EXPECT_TRUE(projection.grid().cells.empty());
+  map.map.clear_object(ObjectId{7});
+  map.publish_to(projection);
+  EXPECT_TRUE(projection.update()) << "what made it too large has gone";
+  EXPECT_FALSE(projection.too_large());
+  EXPECT_EQ(cell(projection, 0, 0), kCellOccupied);
 }
 
 /// All points of a map that is taken over tile by tile, in steps, and at once.

@@ -20,6 +20,14 @@ InputProblem parent_changed(const std::string& child, const std::string& old_par
           "frame \"" + child + "\" had parent \"" + old_parent + "\", now \"" + parent + "\""};
 }
 
+// Names come from peers, and every frame keeps poses.
+constexpr std::size_t kMostFrames = 10000;
+
+InputProblem too_many(const std::string& child) {
+  return {InputReason::kTooLarge, "frame \"" + child + "\" is left out: there are " +
+                                      std::to_string(kMostFrames) + " already"};
+}
+
 }  // namespace
 
 TransformTree::TransformTree(StampNs max_gap_ns, std::size_t capacity, const TransformTree* shared)
@@ -30,6 +38,7 @@ std::optional<InputProblem> TransformTree::set_static(const std::string& parent,
                                                       const PoseQuaternion& T) {
   std::optional<InputProblem> problem;
   const auto edge = edges_.find(child);
+  if (edge == edges_.end() && edges_.size() >= kMostFrames) return too_many(child);
   if (edge != edges_.end() && edge->second.parent != parent) {
     problem = parent_changed(child, edge->second.parent, parent);
   }
@@ -41,6 +50,7 @@ std::optional<InputProblem> TransformTree::add(const std::string& parent, const 
                                                StampNs stamp_ns, const PoseQuaternion& T) {
   std::optional<InputProblem> problem;
   auto edge = edges_.find(child);
+  if (edge == edges_.end() && edges_.size() >= kMostFrames) return too_many(child);
   if (edge == edges_.end() || edge->second.parent != parent || edge->second.is_static) {
     if (edge != edges_.end() && edge->second.parent != parent) {
       problem = parent_changed(child, edge->second.parent, parent);

@@ -5,6 +5,32 @@
 
 namespace pocd::recording {
 
+namespace {
+
+std::filesystem::path numbered(const std::filesystem::path& path, std::size_t number) {
+  char text[24];
+  std::snprintf(text, sizeof text, "_%04zu", number);
+  std::filesystem::path file = path;
+  return file.replace_filename(path.stem().string() + text + path.extension().string());
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> SplitWriter::existing(const std::filesystem::path& path,
+                                                         const SplitOptions& options) {
+  constexpr std::size_t kMostFiles = 10000;
+  std::vector<std::filesystem::path> files;
+  if (!options.splits()) {
+    if (std::filesystem::is_regular_file(path)) files.push_back(path);
+    return files;
+  }
+  for (std::size_t number = 0; number < kMostFiles; ++number) {
+    const std::filesystem::path file = numbered(path, number);
+    if (std::filesystem::exists(file)) files.push_back(file);
+  }
+  return files;
+}
+
 SplitWriter::SplitWriter(std::filesystem::path path, SplitOptions options)
     : path_(std::move(path)), options_(std::move(options)) {
   open_next();
@@ -15,12 +41,7 @@ void SplitWriter::open_next() {
     writer_->close();
     bytes_before_ += writer_->bytes_written();
   }
-  std::filesystem::path file = path_;
-  if (options_.most_bytes > 0 || options_.most_duration_ns > 0) {
-    char number[16];
-    std::snprintf(number, sizeof number, "_%04zu", files_.size());
-    file.replace_filename(path_.stem().string() + number + path_.extension().string());
-  }
+  const std::filesystem::path file = options_.splits() ? numbered(path_, files_.size()) : path_;
   writer_ = std::make_unique<McapWriter>(file, options_.mcap);
   files_.push_back(file);
   empty_ = true;
@@ -49,11 +70,20 @@ std::uint16_t SplitWriter::add_channel(std::uint16_t schema, const std::string& 
 }
 
 void SplitWriter::write(const MessageHeader& header, const std::uint8_t* data, std::size_t size) {
-  const bool large = options_.most_bytes > 0 &&
-                     writer_->bytes_written() + writer_->bytes_held() >= options_.most_bytes;
+  const bool large = options_.most_bytes > 0 && writer_->bytes_written() + writer_->bytes_held() >=
+                                                    head_bytes_ + options_.most_bytes;
   const bool long_enough = options_.most_duration_ns > 0 && header.log_time_ns > first_ns_ &&
                            header.log_time_ns - first_ns_ >= options_.most_duration_ns;
-  if (!empty_ && (large || long_enough)) open_next();
+  if (!empty_ && (large || long_enough)) {
+    open_next();
+    if (head_) {
+      head_([&](MessageHeader first, const std::uint8_t* bytes, std::size_t count) {
+        first.log_time_ns = header.log_time_ns;
+        writer_->write(first, bytes, count);
+      });
+      head_bytes_ = writer_->bytes_written() + writer_->bytes_held();
+    }
+  }
   if (empty_) first_ns_ = header.log_time_ns;
   empty_ = false;
   writer_->write(header, data, size);

@@ -50,7 +50,8 @@ class ObjectWatch {
   ObjectWatch(const ObjectWatch&) = delete;
   ObjectWatch& operator=(const ObjectWatch&) = delete;
 
-  /// False: nobody says what is there now, and what was heard may be out of date. Thread-safe.
+  /// A node that publishes this map is there, whatever other maps there are. False: nobody says
+  /// what is there now, and what was heard may be out of date. Thread-safe.
   bool publisher_present() const;
 
  private:

@@ -114,6 +114,35 @@ TEST(RecordReplay, KeepsEveryPayloadOfAReplay) {
   EXPECT_TRUE(first == payloads(folder / "second.mcap"));
 }
 
+TEST(RecordReplay, EveryFileOfASplitHasTheLatchedSamples) {
+  const Folder folder;
+  const std::vector<std::string> record{command("pocd_record"), "--output",
+                                        (folder / "run.mcap").string(), "--split-size", "0.1"};
+  Process recorder(record);
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  const CommandResult played =
+      run_command({command("pocd_play"), "--dataset", "sim", "--input", scenario(), "--fast",
+                   "--lossless", "--no-color", "--max-frames", "20"});
+  ASSERT_EQ(played.exit_code, 0) << played.err;
+  stop(recorder);
+  const ByTopic first = payloads(folder / "run_0000.mcap"),
+                second = payloads(folder / "run_0001.mcap");
+  ASSERT_GT(second.count("/robot1/depth/image_raw"), 0u);
+  ASSERT_GT(first.count("/tf_static"), 0u);
+  EXPECT_TRUE(second.count("/tf_static") > 0 && second.at("/tf_static") == first.at("/tf_static"));
+
+  const CommandResult again = run_command(record);
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.err.find("run_0000.mcap exists already; --overwrite"), std::string::npos)
+      << again.err;
+  EXPECT_TRUE(payloads(folder / "run_0000.mcap") == first);
+  std::vector<std::string> replace = record;
+  replace.push_back("--overwrite");
+  Process third(replace);
+  EXPECT_TRUE(says(third, "recording on domain"));
+  stop(third);
+}
+
 /// Topics of a type that nothing here was built with.
 void write_foreign(const fs::path& file) {
   recording::McapWriter writer(file);

@@ -97,6 +97,20 @@ TEST(TransformTree, ARenamedParentIsSaid) {
   EXPECT_TRUE(tree.set_static("mast", "camera", {}));
 }
 
+TEST(TransformTree, NamesWithoutEndDoNotTakeMemoryWithoutEnd) {
+  TransformTree tree(100);
+  EXPECT_FALSE(tree.add("odom", "base", 0, {}));
+  std::optional<InputProblem> problem;
+  int frames = 1;
+  for (; !problem && frames < 100000; ++frames) {
+    problem = tree.add("base", "frame" + std::to_string(frames), 0, {});
+  }
+  ASSERT_TRUE(problem);
+  EXPECT_EQ(problem->reason, InputReason::kTooLarge);
+  EXPECT_TRUE(tree.set_static("base", "camera", {}));
+  EXPECT_FALSE(tree.add("odom", "base", 1, {})) << "known frames go on";
+}
+
 TEST(TransformTree, ForgetsARobotAndNothingElse) {
   TransformTree tf(100), own(100, 1000, &tf);
   for (const std::string robot : {"a", "b"}) {

@@ -41,5 +41,23 @@ TEST(PartAssembler, ForgetsTheOldestOfTooMany) {
   EXPECT_TRUE(parts.add(17, {1, 2}));
 }
 
+// Keys begin with the random name of a run: a new run's may be the smallest of all.
+TEST(PartAssembler, LeftoversDoNotPushOutWhatGrows) {
+  PartAssembler<int, Part> parts;
+  for (int step = 1; step <= 16; ++step) EXPECT_FALSE(parts.add(1000 + step, {0, 2}));
+  EXPECT_FALSE(parts.add(1, {0, 3}));
+  EXPECT_FALSE(parts.add(1, {1, 3}));
+  EXPECT_TRUE(parts.add(1, {2, 3}));
+}
+
+TEST(PartAssembler, DropsWhatIsNotWantedAnyMore) {
+  PartAssembler<int, Part> parts;
+  EXPECT_FALSE(parts.add(1, {0, 2}));
+  EXPECT_FALSE(parts.add(2, {0, 2}));
+  parts.keep([](int step) { return step > 1; });
+  EXPECT_FALSE(parts.add(1, {1, 2}));
+  EXPECT_TRUE(parts.add(2, {1, 2}));
+}
+
 }  // namespace
 }  // namespace pocd::dds

@@ -46,9 +46,21 @@ TEST_F(PublishersTest, OneThatWasKilledIsReplacedWhenItIsSilent) {
   EXPECT_TRUE(publishers.present());
 }
 
+// Discovery may be later than the first manifest.
+TEST_F(PublishersTest, OneThatWasNotMetYetIsThere) {
+  heard(kA, 1);
+  const auto nobody = [](const Writer&) { return false; };
+  publishers.forget_gone(nobody, now);
+  EXPECT_TRUE(publishers.present());
+  now += seconds(1);
+  publishers.forget_gone(nobody, now);
+  EXPECT_FALSE(publishers.present()) << "it has never come";
+}
+
 TEST_F(PublishersTest, OneThatHasGoneOrEndedIsReplacedAtOnce) {
   heard(kA, 1);
-  publishers.forget_gone([](const Writer& writer) { return writer != kA; });
+  publishers.forget_gone([](const Writer&) { return true; }, now);
+  publishers.forget_gone([](const Writer& writer) { return writer != kA; }, now);
   EXPECT_FALSE(publishers.present());
   EXPECT_EQ(publishers.followed(), 1u) << "nobody else is there";
   EXPECT_TRUE(heard(kB, 2));

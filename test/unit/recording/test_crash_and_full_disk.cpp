@@ -165,5 +165,34 @@ TEST(SplitWriter, SplitsBySizeAndTime) {
   }
 }
 
+TEST(SplitWriter, EveryFileBeginsWithTheHead) {
+  const TemporaryFolder folder;
+  SplitOptions options;
+  options.most_bytes = 5'000;
+  options.mcap.chunk_bytes = 500;
+  options.mcap.compression = "";
+  EXPECT_TRUE(SplitWriter::existing(folder / "run.mcap", options).empty());
+  SplitWriter writer(folder / "run.mcap", options);
+  const auto schema = writer.add_schema("a", "ros2msg", "uint8 a\n");
+  const auto latched = writer.add_channel(schema, "/latched", "cdr", {});
+  const auto a = writer.add_channel(schema, "/a", "cdr", {});
+  const Bytes large(20'000, 2), data(300, 1);
+  writer.set_head([&](const SplitWriter::Write& write) {
+    write({latched, 7, 5, 6}, large.data(), 20'000);
+  });
+  for (std::uint32_t i = 0; i < 50; ++i) writer.write({a, i, 1000 + i, 0}, data.data(), 300);
+  writer.close();
+  ASSERT_GE(writer.files().size(), 3u);
+  EXPECT_LE(writer.files().size(), 5u) << "a head that is larger than a file is no reason to split";
+  for (std::size_t i = 1; i < writer.files().size(); ++i) {
+    const auto kept = read_all(*open_recording(writer.files()[i]));
+    ASSERT_GE(kept.size(), 2u);
+    EXPECT_EQ(kept[0].topic, "/latched");
+    EXPECT_EQ(kept[0].data, large);
+    EXPECT_EQ(kept[0].log_time_ns, kept[1].log_time_ns) << "no pause in a replay";
+  }
+  EXPECT_EQ(SplitWriter::existing(folder / "run.mcap", options), writer.files());
+}
+
 }  // namespace
 }  // namespace pocd::recording

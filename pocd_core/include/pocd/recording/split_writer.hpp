@@ -1,6 +1,8 @@
 // A recording in several files.
 #pragma once
 
+#include <functional>
+
 #include "pocd/recording/mcap_writer.hpp"
 
 namespace pocd::recording {
@@ -9,6 +11,8 @@ struct SplitOptions {
   McapWriterOptions mcap;
   std::uint64_t most_bytes = 0;        ///< a new file begins beyond this size; 0: never
   std::uint64_t most_duration_ns = 0;  ///< or beyond this span of log times; 0: never
+
+  bool splits() const { return most_bytes > 0 || most_duration_ns > 0; }
 };
 
 /// Writes to `path`, or when splitting to path_0000.mcap, path_0001.mcap ... Every file is
@@ -16,6 +20,9 @@ struct SplitOptions {
 /// McapWriter.
 class SplitWriter {
  public:
+  using Write =
+      std::function<void(const MessageHeader& header, const std::uint8_t* data, std::size_t size)>;
+
   SplitWriter(std::filesystem::path path, SplitOptions options);
 
   std::uint16_t add_schema(const std::string& name, const std::string& encoding,
@@ -24,6 +31,12 @@ class SplitWriter {
                             const std::string& message_encoding,
                             const std::map<std::string, std::string>& metadata);
   void write(const MessageHeader& header, const std::uint8_t* data, std::size_t size);
+  /// Writes what every file after the first begins with; it gets the log time of the message that
+  /// follows.
+  void set_head(std::function<void(const Write&)> head) { head_ = std::move(head); }
+  /// Files that are there already and that such a writer would replace, by name.
+  static std::vector<std::filesystem::path> existing(const std::filesystem::path& path,
+                                                     const SplitOptions& options);
   void flush() { writer_->flush(); }
   void close() { writer_->close(); }
 
@@ -43,6 +56,8 @@ class SplitWriter {
   std::uint64_t bytes_before_ = 0;
   std::uint64_t first_ns_ = 0;
   bool empty_ = true;  // no message in the present file
+  std::function<void(const Write&)> head_;
+  std::uint64_t head_bytes_ = 0;  // of the present file; they do not count for its size
 };
 
 }  // namespace pocd::recording
