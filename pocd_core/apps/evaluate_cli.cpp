@@ -56,9 +56,10 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
                  "Faults put into the frames: pose_jumps, mask_gaps, depth_holes")
       ->delimiter(',')
       ->check(CLI::IsMember(kFaults));
-  app.add_option("--sim", o.sim,
-                 "Change of every simulated scenario, KEY=VALUE: frame_rate_hz, width, height, fx, "
-                 "fy, cx, cy, or a field of the sensor model, as sensor.depth_quadratic_per_m=0.005")
+  app.add_option(
+         "--sim", o.sim,
+         "Change of every simulated scenario, KEY=VALUE: frame_rate_hz, width, height, fx, "
+         "fy, cx, cy, or a field of the sensor model, as sensor.depth_quadratic_per_m=0.005")
       ->excludes(dataset)
       ->allow_extra_args(false);
   app.add_option("--config", o.config, "Configuration file; repeat it to overlay several")

@@ -26,7 +26,7 @@ struct RunnerOptions {
   std::vector<std::uint64_t> seeds = {1};
   std::vector<std::string> faults;
   std::vector<std::string> sim;  ///< changes of every scenario, KEY=VALUE
-  PipelineConfig config;  ///< for depth limit, map voxels, classes
+  PipelineConfig config;         ///< for depth limit, map voxels, classes
   VoxelMetricsConfig voxels;
   int jobs = 1;
   bool with_reference = true;

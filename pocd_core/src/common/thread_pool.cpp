@@ -53,7 +53,7 @@ struct ThreadPool::Impl {
 
   std::vector<std::thread> workers;
   std::vector<Share> shares;  ///< the caller's, then the workers'
-  bool look = true;  ///< there is a processor for each thread
+  bool look = true;           ///< there is a processor for each thread
   // Changed under the mutex only; atomic where somebody looks without it.
   std::mutex mutex;
   std::condition_variable wake, done;

@@ -176,7 +176,8 @@ bool ObjectTracker::reaches_beyond(const Observation& observation, const Oriente
     const Eigen::Vector3d out = at.cwiseAbs() - 0.5 * box.size_m;
     if (out.head<2>().maxCoeff() > margin_m) ++beyond;
   }
-  return static_cast<double>(beyond) > kArrivedShare * static_cast<double>(observation.points.size());
+  return static_cast<double>(beyond) >
+         kArrivedShare * static_cast<double>(observation.points.size());
 }
 
 const OrientedBox& ObjectTracker::known_box(const LibraryObject& object) {

@@ -284,8 +284,8 @@ PlaneVotes count_votes(const PlaneSegmentation& planes, const OrganizedCloud& cl
 }
 
 /// Height of the pixels of a ground class where nearly all agree within `band_m` [m, W]: a strip at
-/// the image's edge is too little for a plane, but a thing's ragged foot is not to be joined over it
-/// with the next one's.
+/// the image's edge is too little for a plane, but a thing's ragged foot is not to be joined over
+/// it with the next one's.
 std::optional<float> ground_class_level(const OrganizedCloud& cloud, float band_m) {
   constexpr std::size_t kPixels = 50;
   constexpr double kShare = 0.9;
@@ -297,8 +297,8 @@ std::optional<float> ground_class_level(const OrganizedCloud& cloud, float band_
   const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
   std::nth_element(z.begin(), middle, z.end());
   const float level = *middle;
-  const auto near = std::count_if(z.begin(), z.end(),
-                                  [&](float v) { return std::abs(v - level) <= band_m; });
+  const auto near =
+      std::count_if(z.begin(), z.end(), [&](float v) { return std::abs(v - level) <= band_m; });
   if (static_cast<double>(near) < kShare * static_cast<double>(z.size())) return std::nullopt;
   return level;
 }
@@ -363,7 +363,8 @@ void GroundModel::update(const PlaneSegmentation& planes, const SegmentationConf
     offset_m_ = level_m_;
   }
   if (!known_) {
-    if (const auto level = ground_class_level(cloud, 2.0f * static_cast<float>(config.ground_band_m))) {
+    if (const auto level =
+            ground_class_level(cloud, 2.0f * static_cast<float>(config.ground_band_m))) {
       known_ = from_class_ = true;
       normal_W_ = Eigen::Vector3f::UnitZ();
       offset_m_ = level_m_ = *level;

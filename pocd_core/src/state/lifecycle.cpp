@@ -22,8 +22,7 @@ Eigen::Vector3d sorted_size(const OrientedBox& box) {
 Belief next_belief(const Belief& before, const Measurement& measurement, const StateConfig& state,
                    const ChangeConfig& change) {
   Belief after = bayesian_update(before, measurement, change.delta_max_m).belief;
-  if (after.stationarity() > state.max_stationarity &&
-      after.stationarity() > before.stationarity())
+  if (after.stationarity() > state.max_stationarity && after.stationarity() > before.stationarity())
     return before;
   after = clamp_counts(after, state.max_count);
   after.sigma = std::max(after.sigma, state.min_sigma_share * change.tau_m);

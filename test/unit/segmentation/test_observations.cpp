@@ -196,7 +196,8 @@ TEST(Observations, AMaskOfStripesHasPoints) {
   const PipelineConfig config = test::room_config();
   const int stride = config.segmentation.stride;
   Frame frame = shoot(room_with({solid(kBoxClass, {0, 1.3}, {1.6, 0.4, 1.6})}), viewpoint());
-  // The class in odd columns of the grid only: none of them is on the grid that is looked at near by.
+  // The class in odd columns of the grid only: none of them is on the grid that is looked at near
+  // by.
   for (int v = 0; v < frame.labels.rows; ++v) {
     for (int u = 0; u < frame.labels.cols; ++u) {
       if (u / stride % 2 == 0) frame.labels.at<std::uint16_t>(v, u) = kPersonClass;

@@ -43,10 +43,9 @@ class GroundModel {
  public:
   /// Looks for the ground among the planes that face up: those whose pixels are mostly of a ground
   /// class if there are any, else the lowest that is large enough; until there is one, at the level
-  /// of the pixels of a ground class, if they agree. A narrow strip holds its tilt for its own frame
-  /// only. Then marks as kGround every
-  /// pixel in the band above the plane, and below it; a pixel of a ground class elsewhere becomes
-  /// background, one above `max_height_m` too.
+  /// of the pixels of a ground class, if they agree. A narrow strip holds its tilt for its own
+  /// frame only. Then marks as kGround every pixel in the band above the plane, and below it; a
+  /// pixel of a ground class elsewhere becomes background, one above `max_height_m` too.
   void update(const PlaneSegmentation& planes, const SegmentationConfig& config,
               const DepthNoise& noise, OrganizedCloud& cloud);
 
