@@ -103,10 +103,20 @@ void RawReader::wake_again() { impl_->wakeup->wake(); }
 
 bool RawReader::take_raw(void* sample, SampleMeta& meta) {
   SampleInfo info;
-  const std::uint64_t damaged_before = damaged_payloads();
-  const auto taken = impl_->reader->take_next_sample(sample, &info);
-  impl_->damaged += damaged_payloads() - damaged_before;
-  if (taken != ReturnCode_t::RETCODE_OK) return false;
+  // A damaged sample ends the call without a sample, though good ones may be behind it.
+  constexpr int kMostDamaged = 100;
+  for (int i = 0;; ++i) {
+    const std::uint64_t damaged_before = damaged_payloads();
+    const auto taken = impl_->reader->take_next_sample(sample, &info);
+    const std::uint64_t damaged = damaged_payloads() - damaged_before;
+    impl_->damaged += damaged;
+    if (taken == ReturnCode_t::RETCODE_OK) break;
+    if (damaged == 0) return false;
+    if (i == kMostDamaged) {
+      wake_again();
+      return false;
+    }
+  }
   meta.valid = info.valid_data;
   // The state is that of the instance now: of a sample that was followed by a dispose, too.
   meta.disposed = !info.valid_data && info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
