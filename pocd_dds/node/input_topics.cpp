@@ -1,5 +1,7 @@
 #include "pocd_dds/node/input_topics.hpp"
 
+#include <string_view>
+
 namespace pocd::dds {
 
 InputTopics::InputTopics(const NodeConfig& node) {
@@ -29,6 +31,13 @@ const TopicSpec* InputTopics::spec_of(const std::string& topic) const {
     if (robot_in(pattern, topic)) return spec;
   }
   return nullptr;
+}
+
+Delivery input_delivery(const TopicSpec& spec, bool lossless) {
+  if (!lossless) return spec.delivery;
+  constexpr int kImages = 8, kSmallOnes = 1000;
+  const bool images = std::string_view(spec.type) == topics::kDepth.type;
+  return {true, false, 0, images ? kImages : kSmallOnes, 0, false, 0};
 }
 
 }  // namespace pocd::dds

@@ -23,4 +23,8 @@ class InputTopics {
   std::vector<std::pair<std::string, const TopicSpec*>> patterns_;
 };
 
+/// How the node reads a topic of its input: as the table says or, in a replay without loss, with a
+/// history that holds the sender back.
+Delivery input_delivery(const TopicSpec& spec, bool lossless);
+
 }  // namespace pocd::dds

@@ -36,9 +36,10 @@ Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig
       topics_(node),
       roster_(node),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
-      tf_(node.topics.own_tf() ? nullptr
-                               : std::make_unique<TransformInput>(participant, node.topics.tf,
-                                                                  node.topics.tf_static, wakeup_)),
+      tf_(node.topics.own_tf()
+              ? nullptr
+              : std::make_unique<TransformInput>(participant, node.topics.tf, node.topics.tf_static,
+                                                 node.lossless, wakeup_)),
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
   for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
   update_status();

@@ -5,13 +5,11 @@
 #include <utility>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/node/input_topics.hpp"
 
 namespace pocd::dds {
 namespace {
 
-// In a replay without loss the reader's history is the buffer that holds the player back.
-constexpr Delivery kLosslessImages{true, false, 0, 8, 0, false, 0};
-constexpr Delivery kLosslessSmall{true, false, 0, 1000, 0, false, 0};
 // Taken in one turn, so that a topic which never stops coming does not hold up the others.
 constexpr int kMostImages = 16, kMostMessages = 1000;
 // Depth images that wait for something; the synchroniser would drop beyond twice as many.
@@ -55,10 +53,6 @@ std::string name_of(const std::string& own, const std::string& pattern, const Ro
   return own.empty() ? robot_topic(pattern, robot.name) : own;
 }
 
-Delivery delivery_of(const TopicSpec& spec, bool lossless, const Delivery& instead) {
-  return lossless ? instead : spec.delivery;
-}
-
 }  // namespace
 
 RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
@@ -76,19 +70,20 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
       latency_(latency),
       transforms_(nanoseconds(node.max_pose_gap_s), 1000, &shared),
       synchronizer_(synchronizer_config(node, robot), transforms_),
-      tf_(node.topics.own_tf() ? std::make_unique<TransformInput>(
-                                     participant, robot_topic(node.topics.tf, robot.name),
-                                     robot_topic(node.topics.tf_static, robot.name), wakeup)
-                               : nullptr),
+      tf_(node.topics.own_tf()
+              ? std::make_unique<TransformInput>(
+                    participant, robot_topic(node.topics.tf, robot.name),
+                    robot_topic(node.topics.tf_static, robot.name), node.lossless, wakeup)
+              : nullptr),
       odometry_(participant, topics::kOdometry,
                 name_of(robot.odometry_topic, node.topics.odometry, robot),
-                delivery_of(topics::kOdometry, node.lossless, kLosslessSmall), wakeup),
+                input_delivery(topics::kOdometry, node.lossless), wakeup),
       camera_info_(participant, topics::kCameraInfo,
                    name_of(robot.camera_info_topic, node.topics.camera_info, robot),
-                   delivery_of(topics::kCameraInfo, node.lossless, kLosslessSmall), wakeup) {
+                   input_delivery(topics::kCameraInfo, node.lossless), wakeup) {
   const auto image_reader = [&](const TopicSpec& spec, const std::string& topic) {
     return std::make_unique<ImageReader>(participant, spec, topic,
-                                         delivery_of(spec, node.lossless, kLosslessImages), wakeup);
+                                         input_delivery(spec, node.lossless), wakeup);
   };
   if (node.segmentation != "absent") {
     segmentation_ = image_reader(
@@ -225,8 +220,6 @@ void RobotInput::add_image(Stream stream, ConvertedImage&& converted, std::int64
     problems_.count(topic, {InputReason::kUnknownColour, "a colour of no class became class 0"},
                     converted.unknown_pixels);
   }
-  segmentation_delivers_ = segmentation_delivers_ || stream == Stream::kSegmentation;
-  color_delivers_ = color_delivers_ || stream == Stream::kColor;
   const recording::RosHeader& header = converted.header;
   if (stream == Stream::kDepth && !accept_camera_frame(header.frame_id, topic)) return;
   const auto problem = synchronizer_.add_image(stream, header.stamp_ns, std::move(converted.image));
@@ -303,17 +296,26 @@ std::string RobotInput::waiting_for() const {
   return synchronizer_.waiting_for();
 }
 
+void RobotInput::set_patience() {
+  const bool endless = lossless_ && given_up_ != Stream::kPose && given_up_ != Stream::kCameraInfo;
+  synchronizer_.set_patience(endless ? Patience::kEndless : Patience::kBounded);
+  if (!endless) return;
+  // What nobody announces does not come.
+  const auto of_images = [&](Stream stream, const ImageReader* reader, bool required) {
+    if (reader == nullptr) return;
+    if (given_up_ == stream) {
+      synchronizer_.set_patience(stream, Patience::kNone);
+    } else if (!required && reader->matched() == 0) {
+      synchronizer_.set_patience(stream, Patience::kBounded);
+    }
+  };
+  of_images(Stream::kSegmentation, segmentation_.get(), segmentation_required_);
+  of_images(Stream::kColor, color_.get(), color_required_);
+}
+
 std::vector<Frame> RobotInput::take(bool last_call) {
-  // An optional stream is worth an endless wait only once it has delivered: an announced topic may
-  // stay silent.
-  const bool segmentation_comes = !segmentation_ || segmentation_required_ ||
-                                  (segmentation_delivers_ && segmentation_->matched() > 0);
-  const bool color_comes = !color_ || color_required_ || (color_delivers_ && color_->matched() > 0);
   judge_silence();
-  const bool image_given_up = given_up_ == Stream::kSegmentation || given_up_ == Stream::kColor;
-  synchronizer_.set_missing(image_given_up ? given_up_ : std::nullopt);
-  synchronizer_.set_patient(lossless_ && segmentation_comes && color_comes &&
-                            (!given_up_ || image_given_up));
+  set_patience();
 
   std::vector<Frame> frames;
   const std::vector<SyncedFrame> ready =
@@ -345,7 +347,6 @@ std::optional<std::vector<std::string>> RobotInput::settle_departure() {
   if (!source_left_) return std::nullopt;
   std::vector<std::string> frames = transforms_.chain(map_frame_, camera_frame_);
   had_source_ = source_left_ = false;
-  segmentation_delivers_ = color_delivers_ = false;
   synchronizer_.restart();
   transforms_.forget_moving();
   heard_.clear();

@@ -90,6 +90,7 @@ class RobotInput {
   bool accept_camera_frame(const std::string& frame, const std::string& topic);
   void heard(Stream stream);
   void judge_silence();
+  void set_patience();
   std::string topic_of(Stream stream) const;
 
   RobotConfig robot_;
@@ -110,7 +111,6 @@ class RobotInput {
   std::uint64_t refused_ = 0;
   double take_cpu_ms_ = 0.0;
   bool segmentation_required_ = false, color_required_ = false;
-  bool segmentation_delivers_ = false, color_delivers_ = false;
   std::map<Stream, Clock::time_point> heard_;
   Clock::time_point moved_on_ = Clock::now();  ///< a frame came out, or few wait
   std::optional<Stream> given_up_;             ///< a silent stream that is not waited for any more

@@ -1,6 +1,7 @@
 #include "pocd_dds/node/transform_input.hpp"
 
 #include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/node/input_topics.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -12,8 +13,8 @@ constexpr const char* kDamaged = "a message that cannot be read";
 
 TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
                                const std::string& tf_topic, const std::string& tf_static_topic,
-                               Wakeup& wakeup)
-    : moving_(participant, topics::kTf, tf_topic, topics::kTf.delivery, wakeup),
+                               bool lossless, Wakeup& wakeup)
+    : moving_(participant, topics::kTf, tf_topic, input_delivery(topics::kTf, lossless), wakeup),
       static_(participant, topics::kTfStatic, tf_static_topic, topics::kTfStatic.delivery, wakeup) {
 }
 

@@ -16,7 +16,7 @@ class TransformInput {
  public:
   /// `wakeup` must outlive it.
   TransformInput(const std::shared_ptr<Participant>& participant, const std::string& tf_topic,
-                 const std::string& tf_static_topic, Wakeup& wakeup);
+                 const std::string& tf_static_topic, bool lossless, Wakeup& wakeup);
 
   /// Puts what has arrived into the tree. True when there was anything that moves.
   bool drain(TransformTree& tree, ProblemCounter& problems);

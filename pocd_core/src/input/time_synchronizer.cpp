@@ -41,6 +41,26 @@ TimeSynchronizer::TimeSynchronizer(const SynchronizerConfig& config,
   POCD_CHECK(config.capacity > 0 && config.max_wait_ns >= 0 && config.tolerance_ns >= 0);
 }
 
+void TimeSynchronizer::set_patience(Patience patience) {
+  for (const Stream stream : {Stream::kDepth, Stream::kSegmentation, Stream::kColor,
+                              Stream::kCameraInfo, Stream::kPose}) {
+    patience_[stream] = patience;
+  }
+}
+
+bool TimeSynchronizer::wait_over(Stream stream, StampNs ahead_ns) const {
+  const auto set = patience_.find(stream);
+  switch (set == patience_.end() ? Patience::kBounded : set->second) {
+    case Patience::kBounded:
+      return ahead_ns > config_.max_wait_ns;
+    case Patience::kEndless:
+      return false;
+    case Patience::kNone:
+      return true;
+  }
+  return true;
+}
+
 std::optional<StampNs> TimeSynchronizer::newest_ns(Stream stream) const {
   const auto order = orders_.find(stream);
   return order == orders_.end() ? std::nullopt : order->second.newest_ns();
@@ -142,8 +162,9 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
   const StampNs newest_of_all_ns = horizon_ns();
   while (!depth_.empty()) {
     const StampNs stamp_ns = depth_.front().first;
-    const bool late = !patient_ && newest_of_all_ns - stamp_ns > config_.max_wait_ns;
-    const bool settle = last_call || late;
+    const auto settled = [&](Stream stream) {
+      return last_call || wait_over(stream, newest_of_all_ns - stamp_ns);
+    };
     SyncedFrame frame;
     frame.stamp_ns = stamp_ns;
     std::uint64_t* drop = nullptr;
@@ -160,7 +181,7 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
         out = std::move(*image);
         return true;
       }
-      if (!settle && !passed(stream) && missing_ != stream) {
+      if (!settled(stream) && !passed(stream)) {
         blocked_by_ = stream;
         return false;
       }
@@ -172,19 +193,22 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
       return true;
     };
 
-    if (!camera_at(stamp_ns, settle || passed(Stream::kCameraInfo), frame.camera)) {
-      if (!settle && !passed(Stream::kCameraInfo)) {
+    const bool camera_settled = settled(Stream::kCameraInfo) || passed(Stream::kCameraInfo);
+    if (!camera_at(stamp_ns, camera_settled, frame.camera)) {
+      if (!camera_settled) {
         blocked_by_ = Stream::kCameraInfo;
         break;
       }
       drop = &counts_.dropped_no_camera_info;
     }
     if (drop == nullptr) {
-      const TransformLookup pose = transforms_.lookup(
-          config_.map_frame, config_.camera_frame, stamp_ns, settle ? config_.extrapolation_ns : 0);
+      const bool pose_settled = settled(Stream::kPose);
+      const TransformLookup pose =
+          transforms_.lookup(config_.map_frame, config_.camera_frame, stamp_ns,
+                             pose_settled ? config_.extrapolation_ns : 0);
       if (pose.result == PoseLookup::kFound) {
         frame.T_W_C = pose.T_target_source;
-      } else if (!settle &&
+      } else if (!pose_settled &&
                  (pose.result == PoseLookup::kTooNew || pose.result == PoseLookup::kEmpty)) {
         blocked_by_ = Stream::kPose;
         blocking_edge_ = pose.edge;

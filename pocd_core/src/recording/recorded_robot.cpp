@@ -24,7 +24,7 @@ RecordedRobot::RecordedRobot(const std::string& name, const RecordingOptions& op
       transforms_(options.max_pose_gap_ns),
       synchronizer_(synchronizer_config(options, streams), transforms_) {
   // Everything there is will come: how far one stream runs ahead of another says nothing.
-  synchronizer_.set_patient(true);
+  synchronizer_.set_patience(Patience::kEndless);
 }
 
 std::optional<InputProblem> RecordedRobot::add_image(TimeSynchronizer::Stream stream,

@@ -134,7 +134,7 @@ TEST_F(Synchronizer, NeverExtrapolatesBeyondTheBound) {
 
 TEST_F(Synchronizer, PatientOneWaitsHoweverFarOthersRunAhead) {
   TimeSynchronizer sync(config_, tree_);
-  sync.set_patient(true);
+  sync.set_patience(Patience::kEndless);
   pose(sync, 100 * kMs);
   sync.add_camera_info(100 * kMs, camera());
   sync.add_image(Stream::kDepth, 100 * kMs, image(1));
@@ -142,6 +142,31 @@ TEST_F(Synchronizer, PatientOneWaitsHoweverFarOthersRunAhead) {
   EXPECT_TRUE(sync.take().empty());
   sync.add_image(Stream::kSegmentation, 100 * kMs, image(2));
   EXPECT_EQ(sync.take().size(), 1u);
+}
+
+// A replay in which nobody sends labels: they are not waited for, the pose is.
+TEST_F(Synchronizer, PatienceWithOneStreamIsNotPatienceWithAnother) {
+  for (const Patience with_labels : {Patience::kBounded, Patience::kNone}) {
+    TransformTree tree(1000 * kMs);
+    tree.set_static("base", "camera", PoseQuaternion{});
+    TimeSynchronizer sync(config_, tree);
+    sync.set_patience(Patience::kEndless);
+    sync.set_patience(Stream::kSegmentation, with_labels);
+    const auto add = [&](StampNs stamp_ns) {
+      sync.add_camera_info(stamp_ns, camera());
+      sync.add_image(Stream::kDepth, stamp_ns, image(1));
+      return sync.take().size();
+    };
+    EXPECT_EQ(add(100 * kMs), 0u);
+    EXPECT_EQ(add(900 * kMs), 0u) << "further ahead than max_wait_ns";
+    EXPECT_EQ(sync.blocked_by(), Stream::kPose);
+    sync.pose_seen(100 * kMs, tree.add("map", "base", 100 * kMs, PoseQuaternion{}));
+    EXPECT_EQ(sync.take().size(), 1u);
+    EXPECT_EQ(sync.counts().without_segmentation, 1u);
+    sync.pose_seen(900 * kMs, tree.add("map", "base", 900 * kMs, PoseQuaternion{}));
+    EXPECT_EQ(sync.take().size(), with_labels == Patience::kNone ? 1u : 0u);
+    EXPECT_EQ(sync.counts().dropped_no_pose, 0u);
+  }
 }
 
 TEST_F(Synchronizer, RefusesStampsThatJumpBackwards) {
@@ -169,7 +194,7 @@ TEST_F(Synchronizer, OneStampFarInTheFutureDoesNotMuteAStream) {
       TransformTree tree(1000 * kMs);
       tree.set_static("base", "camera", PoseQuaternion{});
       TimeSynchronizer sync(config_, tree);
-      sync.set_patient(patient);
+      sync.set_patience(patient ? Patience::kEndless : Patience::kBounded);
       int restarts = 0, refusals = 0, complete_late = 0;
       StampNs last_ns = 0;
       std::uint64_t depth_added = 0;

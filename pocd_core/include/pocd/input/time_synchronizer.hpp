@@ -23,6 +23,11 @@ namespace pocd {
 /// the frame is dropped.
 enum class StreamUse { kAbsent, kOptional, kRequired };
 
+/// How long a frame waits for what it lacks of one stream. kBounded: until newer data of the robot
+/// is `max_wait_ns` ahead; kEndless (a replay without loss): however far other streams run ahead;
+/// kNone: what is not there is missing.
+enum class Patience { kBounded, kEndless, kNone };
+
 struct SynchronizerConfig {
   StreamUse segmentation = StreamUse::kOptional;
   StreamUse color = StreamUse::kAbsent;
@@ -80,12 +85,9 @@ class TimeSynchronizer {
   /// said of the pose.
   void pose_seen(StampNs stamp_ns, const std::optional<InputProblem>& problem);
 
-  /// Unbounded wait for replay without loss: what a frame lacks is waited for, however far other
-  /// streams run ahead.
-  void set_patient(bool patient) { patient_ = patient; }
-
-  /// A stream of images that is missing at once wherever it is not there; nothing: none.
-  void set_missing(std::optional<Stream> stream) { missing_ = stream; }
+  /// Of one stream, or of all; kBounded until something else is said.
+  void set_patience(Stream stream, Patience patience) { patience_[stream] = patience; }
+  void set_patience(Patience patience);
 
   /// Frame of the depth camera in the transforms, when only the first image tells.
   void set_camera_frame(const std::string& frame) { config_.camera_frame = frame; }
@@ -120,6 +122,7 @@ class TimeSynchronizer {
   std::optional<InputProblem> judge(Stream stream, StampNs stamp_ns);
   void drop_beyond(Stream stream, StampNs stamp_ns);
   StampNs horizon_ns() const;
+  bool wait_over(Stream stream, StampNs ahead_ns) const;
 
   SynchronizerConfig config_;
   const TransformTree& transforms_;
@@ -128,8 +131,7 @@ class TimeSynchronizer {
   std::map<Stream, StampOrder> orders_;
   std::optional<StampNs> newest_pose_ns_;
   StampNs watermark_ns_ = std::numeric_limits<StampNs>::min();
-  bool patient_ = false;
-  std::optional<Stream> missing_;
+  std::map<Stream, Patience> patience_;
   std::optional<Stream> blocked_by_;
   std::string blocking_edge_;  // of the pose
   std::optional<InputProblem> pose_problem_;
