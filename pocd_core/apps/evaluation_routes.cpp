@@ -19,7 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "1-10" after "1-9": numbers in names compare as numbers.
 DatasetOptions recordings(const std::string& format, const std::vector<fs::path>& inputs) {
   DatasetOptions dataset;
   dataset.format = format;
@@ -145,7 +144,7 @@ std::vector<RunScore> RouteRunner::run(const std::vector<MethodSpec>& methods,
 Scenario RouteRunner::scenario_of(const Route& route) const {
   Scenario scenario = load_run(route.files);
   SimChanges changes{scenario.frame_rate_hz, scenario.camera, scenario.sensor};
-  load_config(changes, {}, options_.sim);
+  load_config(changes, {}, options_.sim, "--sim");
   scenario.frame_rate_hz = changes.frame_rate_hz;
   scenario.camera = changes.camera;
   scenario.sensor = changes.sensor;

@@ -1,5 +1,6 @@
 // Methods x routes x seeds -> tables and pictures.
 #include <iostream>
+#include <optional>
 
 #include "evaluate_cli.hpp"
 #include "evaluation_methods.hpp"
@@ -127,6 +128,7 @@ int main(int argc, char** argv) {
   if (code >= 0) return code;
   pocd::RunnerOptions run_options;
   std::vector<pocd::MethodSpec> methods;
+  std::optional<pocd::RouteRunner> runner;
   try {
     pocd::PipelineConfig& config = run_options.config;
     pocd::load_config(config, options.config, options.overrides);
@@ -143,13 +145,13 @@ int main(int argc, char** argv) {
     run_options.voxels.min_height_m = options.min_height_m;
     run_options.voxels.max_height_m = options.max_height_m;
     methods = list_methods(options);
+    runner.emplace(list_routes(options), run_options);
   } catch (const pocd::InputError& error) {
     std::cerr << "pocd_evaluate: " << error.what() << '\n';
     return 2;
   }
   try {
-    pocd::RouteRunner runner(list_routes(options), run_options);
-    return run(options, run_options.config, runner, methods, run_options.voxels.voxel_size_m);
+    return run(options, run_options.config, *runner, methods, run_options.voxels.voxel_size_m);
   } catch (const std::exception& error) {
     std::cerr << "pocd_evaluate: " << error.what() << '\n';
     return 1;

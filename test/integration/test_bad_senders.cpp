@@ -17,6 +17,8 @@ TEST(BadSenders, AreNamedOnceAndCounted) {
                                                           "rt/tf", kTestDelivery);
   dds::Writer<sensor_msgs::msg::ImagePubSubType> best_effort(
       bus, dds::topics::kSegmentation, "rt/robot1/segmentation", dds::topics::best_effort(5));
+  dds::Writer<tf2_msgs::msg::TFMessagePubSubType> best_effort_tf(bus, dds::topics::kTf, "rt/tf",
+                                                                 dds::topics::best_effort(5));
   RobotSender robot(bus, "robot1");
   Process node(node_command(domain, {"--lossless"}));  // asks for reliable delivery
   ASSERT_TRUE(eventually([&] { return health.newest() != nullptr && robot.matched(); }));
@@ -25,6 +27,8 @@ TEST(BadSenders, AreNamedOnceAndCounted) {
   EXPECT_TRUE(eventually([&] { return health.problem("rt/tf", "wrong_type") == 1; }));
   EXPECT_TRUE(eventually(
       [&] { return health.problem("rt/robot1/segmentation", "incompatible_qos") == 1; }));
+  EXPECT_TRUE(eventually([&] { return health.problem("rt/tf", "incompatible_qos") == 1; }))
+      << "without loss, tf may not be lost either";
 
   robot.send_frame(33'000'000);
   robot.send_frame(66'000'000);

@@ -85,7 +85,7 @@ void overlay(const ShowTo& show, const std::string& source, bool with_lines,
 }  // namespace
 
 void load(const ShowTo& show, const std::vector<std::filesystem::path>& files,
-          const std::vector<std::string>& overrides) {
+          const std::vector<std::string>& overrides, const std::string& option) {
   std::vector<std::string> problems;
   for (const std::filesystem::path& file : files) {
     overlay(
@@ -93,7 +93,7 @@ void load(const ShowTo& show, const std::vector<std::filesystem::path>& files,
   }
   for (const std::string& text : overrides) {
     overlay(
-        show, "--set " + text, false, [&] { return parse_override(text); }, problems);
+        show, option + " " + text, false, [&] { return parse_override(text); }, problems);
   }
   if (problems.empty()) {  // rules need values that are valid one by one
     RuleCheck rules;

@@ -14,7 +14,7 @@ namespace config_detail {
 
 using ShowTo = std::function<void(ParameterSink&)>;
 void load(const ShowTo& show, const std::vector<std::filesystem::path>& files,
-          const std::vector<std::string>& overrides);
+          const std::vector<std::string>& overrides, const std::string& option);
 std::string dump(const ShowTo& show);
 std::string markdown(const ShowTo& show);
 
@@ -22,7 +22,7 @@ std::string markdown(const ShowTo& show);
 
 /// Reads YAML files in order over the values that `config` has; a later file overrides an earlier
 /// one key by key, and a list replaces the whole earlier list. Then `overrides`, each
-/// "group.key=value".
+/// "group.key=value", given by the command line's `option`, which errors name.
 ///
 /// Throws one InputError that lists everything wrong, one line each with file and line: unknown
 /// keys (with the likely intended one), duplicate keys, wrong types, values out of range or not
@@ -30,9 +30,10 @@ std::string markdown(const ShowTo& show);
 /// unspecified.
 template <class T>
 void load_config(T& config, const std::vector<std::filesystem::path>& files,
-                 const std::vector<std::string>& overrides = {}) {
-  config_detail::load([&](ParameterSink& sink) { show_parameters(config, sink); }, files,
-                      overrides);
+                 const std::vector<std::string>& overrides = {},
+                 const std::string& option = "--set") {
+  config_detail::load([&](ParameterSink& sink) { show_parameters(config, sink); }, files, overrides,
+                      option);
 }
 
 /// YAML text of every value; load_config of it gives the same values bit by bit.
