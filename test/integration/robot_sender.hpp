@@ -1,6 +1,7 @@
 // A robot with a small camera, played by the test itself.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,55 +23,62 @@ class RobotSender {
   RobotSender(const std::shared_ptr<dds::Participant>& bus, const std::string& name,
               bool with_labels = false)
       : name_(name),
-        info_(bus, dds::topics::kCameraInfo, "rt/" + name + "/depth/camera_info", kTestDelivery),
-        odometry_(bus, dds::topics::kOdometry, "rt/" + name + "/odom", kTestDelivery),
-        depth_(bus, dds::topics::kDepth, "rt/" + name + "/depth/image_raw", kTestDelivery) {
+        info(bus, dds::topics::kCameraInfo, "rt/" + name + "/depth/camera_info", kTestDelivery),
+        odometry(bus, dds::topics::kOdometry, "rt/" + name + "/odom", kTestDelivery),
+        depth(bus, dds::topics::kDepth, "rt/" + name + "/depth/image_raw", kTestDelivery) {
     if (with_labels) {
-      labels_ = std::make_unique<dds::Writer<sensor_msgs::msg::ImagePubSubType>>(
+      labels = std::make_unique<dds::Writer<sensor_msgs::msg::ImagePubSubType>>(
           bus, dds::topics::kSegmentation, "rt/" + name + "/segmentation", kTestDelivery);
     }
   }
 
   bool matched() const {
-    return depth_.matched() > 0 && info_.matched() > 0 && odometry_.matched() > 0 &&
-           (!labels_ || labels_->matched() > 0);
+    return depth.matched() > 0 && info.matched() > 0 && odometry.matched() > 0 &&
+           (!labels || labels->matched() > 0);
   }
   std::string camera_frame() const { return name_ + "_camera"; }
   std::string depth_topic() const { return "rt/" + name_ + "/depth/image_raw"; }
 
-  /// Camera info and a wall 1.5 m away.
+  /// A wall 1.5 m away.
+  sensor_msgs::msg::Image image(StampNs stamp_ns, const std::string& frame = "") const {
+    return dds::image_message(cv::Mat(20, 30, CV_16UC1, cv::Scalar(1500)), "16UC1", stamp_ns,
+                              frame.empty() ? camera_frame() : frame);
+  }
+  /// With its camera info.
   void send_image(StampNs stamp_ns, const std::string& frame = "") {
-    const std::string camera = frame.empty() ? camera_frame() : frame;
-    auto info = dds::camera_message({30, 20, 40 * zoom_, 40 * zoom_, 15, 10}, stamp_ns, camera);
-    EXPECT_TRUE(info_.write(info));
-    auto depth =
-        dds::image_message(cv::Mat(20, 30, CV_16UC1, cv::Scalar(1500)), "16UC1", stamp_ns, camera);
-    EXPECT_TRUE(depth_.write(depth));
+    auto camera = dds::camera_message({30, 20, 40 * zoom_, 40 * zoom_, 15, 10}, stamp_ns,
+                                      frame.empty() ? camera_frame() : frame);
+    EXPECT_TRUE(info.write(camera));
+    auto wall = image(stamp_ns, frame);
+    EXPECT_TRUE(depth.write(wall));
   }
   void zoom(double factor) { zoom_ *= factor; }
   void send_labels(StampNs stamp_ns) {
-    auto labels =
+    auto unlabelled =
         dds::image_message(cv::Mat(20, 30, CV_8UC1, cv::Scalar(0)), "mono8", stamp_ns, "");
-    EXPECT_TRUE(labels_->write(labels));
+    EXPECT_TRUE(labels->write(unlabelled));
   }
   void send_odometry(const StampedTransform& transform) {
     auto message = dds::odometry_message(transform);
-    EXPECT_TRUE(odometry_.write(message));
+    EXPECT_TRUE(odometry.write(message));
   }
   /// A whole frame of a robot that stands at the origin, its camera being its base.
   void send_frame(StampNs stamp_ns) {
     send_odometry({"map", camera_frame(), stamp_ns, {}});
-    if (labels_) send_labels(stamp_ns);
+    if (labels) send_labels(stamp_ns);
     send_image(stamp_ns);
   }
 
  private:
   std::string name_;
   double zoom_ = 1.0;
-  dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info_;
-  dds::Writer<nav_msgs::msg::OdometryPubSubType> odometry_;
-  std::unique_ptr<dds::Writer<sensor_msgs::msg::ImagePubSubType>> labels_;
-  dds::Writer<sensor_msgs::msg::ImagePubSubType> depth_;  // last: whoever knows it knows the others
+
+ public:
+  // For messages that no camera sends.
+  dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info;
+  dds::Writer<nav_msgs::msg::OdometryPubSubType> odometry;
+  std::unique_ptr<dds::Writer<sensor_msgs::msg::ImagePubSubType>> labels;  ///< null without
+  dds::Writer<sensor_msgs::msg::ImagePubSubType> depth;  // last: whoever knows it knows the others
 };
 
 /// A writer of rt/tf or rt/tf_static.
@@ -97,9 +105,13 @@ class TransformSender {
 class FrameWatch {
  public:
   explicit FrameWatch(const std::shared_ptr<dds::Participant>& bus)
-      : reader_(bus, dds::topics::kFrames, wakeup_) {}
+      : reader_(bus, dds::topics::kFrames, wakeup_), behind_(bus) {}
 
-  bool matched() const { return reader_.matched() > 0; }
+  /// From here on every record is heard. That the reader has found the node's writer does not say
+  /// that the writer has found the reader, and records are not kept for late joiners. But a
+  /// participant announces its readers in the order of their making: a node whose health has come
+  /// in by a reader that was made later has found this one, too.
+  bool matched() { return reader_.matched() > 0 && behind_.newest() != nullptr; }
   int processed(const std::string& robot) {
     pocd_msgs::msg::FrameRecord record;
     dds::SampleMeta meta;
@@ -112,6 +124,7 @@ class FrameWatch {
  private:
   dds::Wakeup wakeup_;
   dds::Reader<pocd_msgs::msg::FrameRecordPubSubType> reader_;
+  HealthWatch behind_;  // made after the reader
   std::map<std::string, int> processed_;
 };
 

@@ -55,16 +55,8 @@ TEST(Chain, LiveEqualsOfflineAndRemovalIsDisposed) {
   Process node(node_command(domain, {"--lossless", "--epoch", "77"}));
   ASSERT_TRUE(eventually([&] { return objects.matched(); }));
   const auto output = folder.path() / "mirror";
-  Process mirror(
-      {bin("pocd_mirror"), "--until-end", "--domain", domain.text(), "--output", output.string()});
-  const std::string said = play_and_end(node, play_command(domain));
-  const CommandResult mirrored = mirror.wait();
-  EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err << mirrored.out;
-
-  EXPECT_NE(mirrored.out.find("in step with publisher"), std::string::npos) << mirrored.out;
-  EXPECT_NE(mirrored.out.find("digest " + expected.map_digest), std::string::npos)
-      << mirrored.out << "offline " << expected.map_digest << "\n"
-      << said;
+  const std::string said =
+      play_and_compare(domain, node, play_command(domain), expected, {"--output", output.string()});
   EXPECT_NE(said.find(std::to_string(expected.frames) + " frames processed, " +
                       std::to_string(expected.refused) + " refused"),
             std::string::npos)

@@ -129,8 +129,11 @@ TEST(DamagedPayloads, AreCountedAndEndNothing) {
   EXPECT_TRUE(eventually([&] { return count(info) == 3; }));
   EXPECT_TRUE(eventually([&] { return count(tf) == 3; }));
 
-  for (int i = 1; i <= 30; ++i) robot.send_frame(i * StampNs{50'000'000});
-  EXPECT_TRUE(eventually([&] { return frames.processed("robot1") > 0; })) << "it goes on";
+  StampNs stamp_ns = 0;
+  EXPECT_TRUE(eventually([&] {
+    robot.send_frame(stamp_ns += 50'000'000);
+    return frames.processed("robot1") > 0;
+  })) << "it goes on";
   node.signal(SIGTERM);
   const CommandResult result = node.wait();
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -152,7 +155,7 @@ TEST(Reader, TakesSomeAndComesBackForTheRest) {
   ASSERT_TRUE(writer.wait_acknowledged(kGenerous));
   int taken = 0;
   const auto turn = [&] {
-    wakeup.wait_for(std::chrono::hours(1));
+    wakeup.wait_for(kGenerous);
     reader.take_some(2, [&](const auto&, const dds::SampleMeta&) { ++taken; });
   };
   for (const int expected : {2, 4, 5}) {

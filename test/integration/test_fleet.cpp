@@ -43,9 +43,13 @@ TEST(Fleet, ARobotAppearsDiesIsNamedAndForgottenAndComesBack) {
   EXPECT_EQ(departures()[0].reason(), "no sign of life for its lease of 5 s");
   EXPECT_TRUE(eventually([&] { return present() == std::set<std::string>{"other"}; }));
 
-  // All within merge_wait_s: had the dead robot a place left, these would wait for it.
-  for (int i = 1; i <= 5; ++i) other.send_frame(1000'000 * kMs + i * 10 * kMs);
-  EXPECT_TRUE(eventually([&] { return frames.processed("other") >= 4; })) << node.err();
+  // All within merge_wait_s: had the dead robot a place left, these would wait for it. The node's
+  // readers are best effort: sent until enough are heard.
+  int sent = 0;
+  EXPECT_TRUE(eventually([&] {
+    if (sent < 90) other.send_frame(1000'000 * kMs + ++sent * 10 * kMs);
+    return frames.processed("other") >= 4;
+  })) << node.err();
 
   const int before = frames.processed("robot1");
   auto again = play_live(domain);

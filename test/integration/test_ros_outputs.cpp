@@ -262,6 +262,7 @@ TEST(RosOutputs, ObstaclesAreRefreshedInTimeAndGoByDeleteAndByLapse) {
     ASSERT_EQ(ends_ns.size(), tick < 100 ? 2u : 1u) << second;
     for (const auto& [id, end_ns] : ends_ns) EXPECT_GT(end_ns, stamp(second + 0.5)) << id;
   }
+  // Best effort, and yet exact: the reader shares the participant of the writer.
   EXPECT_EQ(messages, 20) << "twice a second";
   EXPECT_EQ(marker_messages, 50) << "five times a second";
   EXPECT_EQ(deletes, 5) << "a message may be lost";
@@ -280,10 +281,8 @@ TEST(RosOutputs, EachCanBeSwitchedOff) {
   }
   Process node(node_command(domain, off));
   ASSERT_TRUE(eventually([&] { return health.newest() != nullptr; }));
-  const std::uint64_t heard = health.newest()->stamp().sec();
-  // The second sample comes when all writers that there are have been announced for long.
-  ASSERT_TRUE(
-      eventually([&] { return health.newest()->stamp().sec() != static_cast<int>(heard); }));
+  // A participant announces its writers in the order of their making, and the node makes that of
+  // its health after those: all that there are have been found.
   EXPECT_EQ(tool.matched(), 0);
   node.signal(SIGINT);
   EXPECT_EQ(node.wait().exit_code, 0);

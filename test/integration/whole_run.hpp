@@ -45,11 +45,19 @@ inline std::string play_and_end(Process& node, const std::vector<std::string>& p
 
 /// The same, with a mirror beside it that has to end with the map of the offline run.
 inline std::string play_and_compare(const TestDomain& domain, Process& node,
-                                    const std::vector<std::string>& play,
-                                    const RunSummary& offline) {
-  Process mirror({bin("pocd_mirror"), "--until-end", "--domain", domain.text()});
+                                    const std::vector<std::string>& play, const RunSummary& offline,
+                                    const std::vector<std::string>& mirror_more = {}) {
+  std::vector<std::string> follow{bin("pocd_mirror"), "--until-end", "--timeout", "300",
+                                  "--domain",         domain.text()};
+  follow.insert(follow.end(), mirror_more.begin(), mirror_more.end());
+  Process mirror(follow);
+  // A run this short could be over before the mirror has heard of the node.
+  EXPECT_TRUE(eventually([&] {
+    return mirror.err().find("in step with publisher") != std::string::npos;
+  })) << mirror.err();
   const std::string said = play_and_end(node, play);
   const CommandResult mirrored = mirror.wait();
+  EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err;
   EXPECT_NE(mirrored.out.find("digest " + offline.map_digest), std::string::npos)
       << mirrored.out << mirrored.err << "offline " << offline.map_digest;
   return said;

@@ -9,7 +9,7 @@
 namespace pocd {
 namespace {
 
-// The folder's own build of the installed example; empty when it failed.
+// The folder's own build of the installed example.
 std::string built_lane_watch(const TemporaryFolder& folder) {
   const std::string prefix = POCD_BIN_DIR "/..", build = (folder.path() / "build").string();
   const CommandResult configured = run_command(
@@ -19,13 +19,6 @@ std::string built_lane_watch(const TemporaryFolder& folder) {
   const CommandResult built = run_command({POCD_CMAKE, "--build", build});
   EXPECT_EQ(built.exit_code, 0) << built.out << built.err;
   return build + "/lane_watch";
-}
-
-std::size_t times(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
-    ++count;
-  return count;
 }
 
 TEST(Example, LaneWatchSeesWhatComesAndGoes) {
@@ -42,7 +35,7 @@ TEST(Example, LaneWatchSeesWhatComesAndGoes) {
     return std::make_unique<Process>(command);
   };
   const auto says = [&](const Process& process, const std::string& words, std::size_t n = 1) {
-    return eventually([&] { return times(process.out(), words) >= n; });
+    return eventually([&] { return count_of(process.out(), words) >= n; });
   };
   // Past the box in the north, that is gone on the second drive, around a corner; past the one in
   // the south, that stays; and where nothing ever stands.
