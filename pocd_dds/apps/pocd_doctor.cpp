@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -19,6 +20,7 @@ struct DoctorOptions {
   std::vector<std::filesystem::path> files;
   std::vector<std::string> overrides, robots;
   double listen_s = 5.0;
+  bool verbose = false;
   std::string proc = "/proc", shared_memory = "/dev/shm";
 };
 
@@ -47,6 +49,30 @@ Findings check_configuration(const DoctorOptions& options, NodeFile& config) {
   return findings;
 }
 
+/// Says on stderr what is heard, each thing once, when it is heard first.
+class Progress {
+ public:
+  void look(const BusPicture& bus, const IntakeStatus& intake) {
+    for (const auto& [key, endpoint] : bus.all()) {
+      if (endpoint.writer) say(endpoint.topic + ": is announced");
+    }
+    for (const RobotStatus& robot : intake.robots) {
+      if (robot.images > 0) say(robot.name + ": first image");
+      if (robot.frames > 0) say(robot.name + ": first whole frame");
+    }
+    for (const ProblemCounter::Entry& problem : intake.problems) {
+      say(problem.topic + ": " + problem.reason);
+    }
+  }
+
+ private:
+  void say(const std::string& line) {
+    if (said_.insert(line).second) std::cerr << "pocd_doctor: " << line << std::endl;
+  }
+
+  std::set<std::string> said_;
+};
+
 /// Listens as a node would, beside a participant that looks at who and what is there.
 Findings check_bus(const DoctorOptions& options, NodeFile config) {
   Findings findings;
@@ -63,11 +89,17 @@ Findings check_bus(const DoctorOptions& options, NodeFile config) {
   Intake intake(listener, config.node, config.pipeline.classes, intake_watch, frames, latency);
   const auto end = std::chrono::steady_clock::now() +
                    std::chrono::milliseconds(static_cast<long>(1e3 * options.listen_s));
+  BusPicture picture;
+  Progress progress;
+  const auto look = [&] {
+    for (const BusEvent& event : watch.take()) picture.hear(event);
+    if (options.verbose) progress.look(picture, intake.status());
+  };
   while (!stop_requested && std::chrono::steady_clock::now() < end) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    look();
   }
-  BusPicture picture;
-  for (const BusEvent& event : watch.take()) picture.hear(event);
+  look();
   std::string names;
   for (const auto& [key, name] : picture.participants()) {
     if (name != bus.name) names += (names.empty() ? "" : ", ") + name;
@@ -107,6 +139,7 @@ int main(int argc, char** argv) {
   app.add_option("--listen", options.listen_s, "How long to listen to the bus [s]")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
+  app.add_flag("--verbose", options.verbose, "Say on stderr what is heard as soon as it is heard");
   app.add_option("--proc", options.proc, "Where the machine's /proc is")->capture_default_str();
   app.add_option("--shm", options.shared_memory, "Where shared memory is")->capture_default_str();
   int domain = -1;

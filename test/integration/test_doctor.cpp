@@ -38,13 +38,18 @@ struct Machine {
   TemporaryFolder folder;
 };
 
-/// Sends frames to the doctor, once it listens, and then asks it for what it has found.
-CommandResult ask(Process& doctor, RobotSender& robot, const std::function<void(StampNs)>& send) {
-  EXPECT_TRUE(eventually([&] { return robot.matched(); }));
-  for (int i = 1; i <= 40; ++i) {
-    send(i * 200 * kMs);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
+/// Sends to the doctor, whose readers are best effort, until it has heard all of this, and then
+/// asks it for what it has found.
+CommandResult ask(Process& doctor, const std::function<void(StampNs)>& send,
+                  const std::vector<std::string>& heard) {
+  StampNs stamp_ns = 0;
+  EXPECT_TRUE(eventually([&] {
+    send(stamp_ns += 200 * kMs);
+    const std::string said = doctor.err();
+    return std::all_of(heard.begin(), heard.end(), [&](const std::string& line) {
+      return said.find(line + "\n") != std::string::npos;
+    });
+  })) << doctor.err();
   doctor.signal(SIGINT);
   return doctor.wait();
 }
@@ -53,12 +58,16 @@ TEST(Doctor, FindsNothingWhereNothingIsWrong) {
   const TestDomain domain;
   const Machine machine;
   const auto bus = test_participant(domain);
-  RobotSender robot(bus, "robot1");
-  // Two nodes with maps of their own are no mistake, but worth saying.
+  // Two nodes with maps of their own are no mistake, but worth saying. A participant announces its
+  // writers in the order of their making: who has heard of the robot has heard of these.
   dds::Writer<pocd_msgs::msg::ObjectStatePubSubType> upper(bus, dds::topics::kObjects),
       lower(bus, dds::topics::kObjects);
-  Process doctor(machine.command(domain, {"--listen", "120", "--set", "node.segmentation=absent"}));
-  const CommandResult result = ask(doctor, robot, [&](StampNs t) { robot.send_frame(t); });
+  RobotSender robot(bus, "robot1");
+  Process doctor(machine.command(
+      domain, {"--listen", "600", "--verbose", "--set", "node.segmentation=absent"}));
+  const CommandResult result =
+      ask(doctor, [&](StampNs t) { robot.send_frame(t); },
+          {"robot1: first whole frame", "rt/robot1/depth/image_raw: is announced"});
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_NE(result.out.find("note: pocd/objects: 2 nodes publish objects"), std::string::npos)
       << result.out;
@@ -75,13 +84,17 @@ TEST(Doctor, NamesWhatIsWrongOnTheBus) {
   dds::TopicSpec statics = dds::topics::kTfStatic;
   dds::Writer<tf2_msgs::msg::TFMessagePubSubType> volatile_tf(bus, statics, statics.name,
                                                               kTestDelivery);
-  Process doctor(
-      machine.command(domain, {"--listen", "120", "--robot", "robot1", "--robot", "robot2",
-                               "--robot", "robot3", "--set", "node.segmentation=required"}));
-  const CommandResult result = ask(doctor, robot, [&](StampNs t) {
-    robot.send_odometry({"map", "base", t, {}});
-    robot.send_image(t);
-  });
+  Process doctor(machine.command(
+      domain, {"--listen", "600", "--verbose", "--robot", "robot1", "--robot", "robot2", "--robot",
+               "robot3", "--set", "node.segmentation=required"}));
+  const CommandResult result =
+      ask(doctor,
+          [&](StampNs t) {
+            robot.send_odometry({"map", "base", t, {}});
+            robot.send_image(t);
+          },
+          {"rt/robot1/depth/image_raw: no_transform", "rt/robot1/odom: is announced",
+           "rt/robot2/depth/image_raw: is announced", "rt/tf_static: is announced"});
   EXPECT_EQ(result.exit_code, 1);
   for (const char* line :
        {"error: rt/robot1/segmentation: nobody announces it",
