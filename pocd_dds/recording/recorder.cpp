@@ -36,12 +36,18 @@ std::uint64_t now_ns() {
                                         .count());
 }
 
-/// The file, when no recording is lost by it.
+/// The file, when no recording is lost by it. What is replaced goes as a whole: of a longer split
+/// recording no file is left beside those of the new one.
 const std::filesystem::path& checked(const RecorderOptions& options) {
-  if (options.overwrite) return options.output;
   for (const std::filesystem::path& file :
        recording::SplitWriter::existing(options.output, options.split)) {
-    throw InputError(file.string() + " exists already; --overwrite replaces it");
+    if (!options.overwrite) {
+      throw InputError(file.string() + " exists already; --overwrite replaces it");
+    }
+    std::error_code error;
+    if (!std::filesystem::remove(file, error)) {
+      throw InputError(file.string() + ": cannot be replaced: " + error.message());
+    }
   }
   return options.output;
 }

@@ -141,6 +141,8 @@ TEST(RecordReplay, EveryFileOfASplitHasTheLatchedSamples) {
   Process third(replace);
   EXPECT_TRUE(says(third, "recording on domain"));
   stop(third);
+  EXPECT_EQ(payloads(folder / "run_0000.mcap").count("/tf_static"), 0u) << "nobody sent";
+  EXPECT_FALSE(fs::exists(folder / "run_0001.mcap")) << "of the recording that was replaced";
 }
 
 /// Topics of a type that nothing here was built with.
