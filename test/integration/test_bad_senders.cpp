@@ -32,7 +32,6 @@ TEST(BadSenders, AreNamedOnceAndCounted) {
 
   robot.send_frame(33'000'000);
   robot.send_frame(66'000'000);
-  EXPECT_EQ(health.problem(info, "camera_changed"), 0u);
   robot.zoom(1.25);
   robot.send_frame(99'000'000);
   robot.send_frame(132'000'000);
@@ -54,6 +53,38 @@ TEST(BadSenders, AreNamedOnceAndCounted) {
                                         "became 30 x 20, fx 50, fy 50, cx 15, cy 10"),
             1u)
       << result.err;
+}
+
+// Names on the bus are the peers' choice: no number of them takes memory without end.
+TEST(BadSenders, WhatPeersNameIsBounded) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain), other_bus = test_participant(domain);
+  HealthWatch health(bus);
+  Process node(fleet_command(domain));
+  const auto topic = [](int robot) { return "rt/robot" + std::to_string(robot) + "/depth/"; };
+  using Depth = dds::Writer<sensor_msgs::msg::ImagePubSubType>;
+  using Odometry = dds::Writer<nav_msgs::msg::OdometryPubSubType>;
+  std::vector<std::unique_ptr<Depth>> robots;
+  for (int i = 0; i <= 200; ++i) {
+    robots.push_back(
+        std::make_unique<Depth>(bus, dds::topics::kDepth, topic(i) + "image_raw", kTestDelivery));
+  }
+  EXPECT_TRUE(eventually([&] {
+    return health.problem(topic(200) + "image_raw", "too_many_robots") == 1;
+  })) << node.err();
+  EXPECT_TRUE(eventually([&] { return health.newest()->robots().size() == 200; }));
+
+  std::vector<std::unique_ptr<Odometry>> wrong_types;
+  for (int i = 0; i <= 200; ++i) {
+    wrong_types.push_back(std::make_unique<Odometry>(other_bus, dds::topics::kOdometry,
+                                                     topic(i) + "camera_info", kTestDelivery));
+  }
+  // With the one before there are 202 pairs of topic and reason, of which 200 have a place.
+  EXPECT_TRUE(eventually([&] { return health.problem("other topics", "more_problems") == 2; }))
+      << node.err();
+  EXPECT_EQ(health.newest()->problems().size(), 201u);
+  node.signal(SIGTERM);
+  EXPECT_EQ(node.wait().exit_code, 0);
 }
 
 }  // namespace

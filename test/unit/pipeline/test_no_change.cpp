@@ -3,6 +3,7 @@
 
 #include "drive.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/map/map_delta.hpp"
 
 namespace pocd {
 namespace {
@@ -252,8 +253,32 @@ TEST(PipelineNoChange, FrameThatTheMapCannotTakeChangesNothing) {
   ASSERT_FALSE(without.events().empty());
   ASSERT_EQ(with.events().size(), without.events().size());
   for (std::size_t i = 0; i < with.events().size(); ++i) {
-    EXPECT_EQ(with.events()[i].sequence, without.events()[i].sequence);
-    EXPECT_EQ(with.events()[i].object, without.events()[i].object);
+    const ObjectEvent &left = with.events()[i], &right = without.events()[i];
+    EXPECT_EQ(left.sequence, right.sequence);
+    EXPECT_EQ(left.kind, right.kind);
+    EXPECT_EQ(left.object, right.object);
+    EXPECT_EQ(left.evidence.after.alpha, right.evidence.after.alpha);
+  }
+  MapPublisher with_map(1, config.map), without_map(1, config.map);
+  with_map.update(with.pipeline().map());
+  without_map.update(without.pipeline().map());
+  EXPECT_EQ(with_map.digest().hex(), without_map.digest().hex());
+  const auto objects = with.pipeline().objects(), expected = without.pipeline().objects();
+  ASSERT_FALSE(expected.empty());
+  ASSERT_EQ(objects.size(), expected.size());
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const ObjectSnapshot &left = objects[i], &right = expected[i];
+    EXPECT_EQ(left.id, right.id);
+    EXPECT_EQ(left.box.pose.position_W, right.box.pose.position_W);
+    EXPECT_EQ(left.box.pose.yaw_rad, right.box.pose.yaw_rad);
+    EXPECT_EQ(left.box.size_m, right.box.size_m);
+    EXPECT_EQ(left.centroid_W, right.centroid_W);
+    EXPECT_EQ(left.belief.mu, right.belief.mu);
+    EXPECT_EQ(left.belief.sigma, right.belief.sigma);
+    EXPECT_EQ(left.belief.alpha, right.belief.alpha);
+    EXPECT_EQ(left.belief.beta, right.belief.beta);
+    EXPECT_EQ(left.observations, right.observations);
+    EXPECT_EQ(left.last_seen_ns, right.last_seen_ns);
   }
 }
 
