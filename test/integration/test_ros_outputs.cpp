@@ -14,6 +14,7 @@
 #include "pocd_dds/map_mirror.hpp"
 #include "pocd_dds/node/ros_outputs.hpp"
 #include "rmf_obstacle_msgsPubSubTypes.h"
+#include "robot_sender.hpp"
 #include "rosgraph_msgsPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"
@@ -268,6 +269,32 @@ TEST(RosOutputs, ObstaclesAreRefreshedInTimeAndGoByDeleteAndByLapse) {
   EXPECT_EQ(deletes, 5) << "a message may be lost";
   // The component has gone: the manager forgets all within the lifetime.
   for (const auto& [id, end_ns] : ends_ns) EXPECT_LE(end_ns, stamp(9.95 + 1.25)) << id;
+}
+
+// What one robot sees is a kilometre away from what the other sees: 400 million cells.
+TEST(RosOutputs, AGridThatIsTooLargeIsSaidAndNotPublished) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  RobotSender near(bus, "near"), far(bus, "far");
+  Process node(fleet_command(domain, {"--lossless", "--set", "node.segmentation=absent"}));
+  ASSERT_TRUE(
+      eventually([&] { return health.newest() != nullptr && near.matched() && far.matched(); }));
+  StampNs stamp_ns = 0;
+  EXPECT_TRUE(eventually([&] {
+    stamp_ns += 50'000'000;
+    near.send_frame(stamp_ns);
+    PoseQuaternion pose;
+    pose.position = {1000.0, 1000.0, 0.0};
+    far.send_odometry({"map", far.camera_frame(), stamp_ns, pose});
+    far.send_image(stamp_ns);
+    return health.problem(dds::topics::kOccupancy.name, "grid_too_large") == 1;
+  })) << node.err();
+  node.signal(SIGTERM);
+  const CommandResult ended = node.wait();
+  EXPECT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_EQ(count_of(ended.err, "rt/pocd/map: a grid of more than 64000000 cells"), 1u)
+      << ended.err;
 }
 
 TEST(RosOutputs, EachCanBeSwitchedOff) {
