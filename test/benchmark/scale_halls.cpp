@@ -60,15 +60,16 @@ std::vector<Frame> drive_through_hall(double step_m, std::uint64_t seed) {
 
 Site::Site(const PipelineConfig& config, int halls, const std::vector<Frame>& drive)
     : halls_(halls), publisher_(1, config.map) {
-  const std::uint64_t start = heap_in_use();
+  const auto in_use = [] { return static_cast<std::int64_t>(heap_in_use()); };
+  const std::int64_t start = in_use();
   pipeline_ = std::make_unique<PocdPipeline>(config);
   for (int n = 0; n < halls; ++n) {
     for (const Frame& frame : drive) process_at(frame, place_m(n), "robot" + std::to_string(n));
-    const std::uint64_t between = heap_in_use();
+    const std::int64_t between = in_use();
     publish();
-    publisher_heap_ += heap_in_use() - between;
+    publisher_heap_ += in_use() - between;
   }
-  pipeline_heap_ = heap_in_use() - start - publisher_heap_;
+  pipeline_heap_ = in_use() - start - publisher_heap_;
 }
 
 Eigen::Vector2d Site::place_m(int hall) const {

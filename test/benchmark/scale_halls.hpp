@@ -35,9 +35,10 @@ class Site {
   const PocdPipeline& pipeline() const { return *pipeline_; }
   PocdPipeline& pipeline() { return *pipeline_; }
   const MapPublisher& publisher() const { return publisher_; }
-  /// Heap that pipeline and publication took to build [bytes].
-  std::uint64_t pipeline_heap() const { return pipeline_heap_; }
-  std::uint64_t publisher_heap() const { return publisher_heap_; }
+  /// Heap that pipeline and publication took to build [bytes]. Whoever gives memory back that the
+  /// other has asked for has less: below zero, even, but the sum is right.
+  std::int64_t pipeline_heap() const { return pipeline_heap_; }
+  std::int64_t publisher_heap() const { return publisher_heap_; }
 
  private:
   void process_at(Frame frame, const Eigen::Vector2d& at_m, const std::string& robot);
@@ -47,7 +48,7 @@ class Site {
   MapPublisher publisher_;
   StampNs stamp_ns_ = 0;
   std::uint64_t sequence_ = 0;
-  std::uint64_t pipeline_heap_ = 0, publisher_heap_ = 0;
+  std::int64_t pipeline_heap_ = 0, publisher_heap_ = 0;
 };
 
 }  // namespace pocd::benchmark
