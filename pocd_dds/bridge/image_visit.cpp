@@ -21,8 +21,12 @@ bool ImageVisitType::deserialize(SerializedPayload_t* payload, void* data) {
   } catch (const recording::DamagedData&) {
     return false;
   }
-  const auto& visit = *static_cast<const ImageVisit*>(data);
-  if (visit.use) visit.use(image);
+  auto& visit = *static_cast<ImageVisit*>(data);
+  try {
+    if (visit.use) visit.use(image);
+  } catch (...) {
+    visit.failure = std::current_exception();
+  }
   return true;
 }
 

@@ -1,8 +1,10 @@
 // sensor_msgs/Image for a subscriber that converts it where it lies, in the middleware's memory.
 #pragma once
 
+#include <exception>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <functional>
+#include <utility>
 
 #include "pocd/recording/ros_messages.hpp"
 
@@ -11,6 +13,13 @@ namespace pocd::dds {
 /// The "sample" of such a reader: take() calls `use` with views that end with the call.
 struct ImageVisit {
   std::function<void(const recording::RosImage&)> use;
+  /// What `use` has thrown: a mistake of ours and not of the sender, whose payload is good. For the
+  /// one who takes to throw again; it cannot pass through the middleware.
+  std::exception_ptr failure = nullptr;
+
+  void rethrow() {
+    if (failure) std::rethrow_exception(std::exchange(failure, nullptr));
+  }
 };
 
 /// Has the name of the generated type and reads the same payloads; cannot write any.

@@ -4,15 +4,20 @@
 
 namespace pocd::dds {
 
+ProblemCounter::Seen& ProblemCounter::entry_of(const std::string& topic,
+                                               const std::string& reason) {
+  std::pair<std::string, std::string> key{topic, reason};
+  if (seen_.size() >= kMostPairs && seen_.count(key) == 0) key = {"other topics", "more_problems"};
+  return seen_[key];
+}
+
 void ProblemCounter::count(const std::string& topic, const std::string& reason,
                            const std::string& detail, std::uint64_t times) {
   if (times == 0) return;
-  std::pair<std::string, std::string> key{topic, reason};
-  if (seen_.size() >= kMostPairs && seen_.count(key) == 0) key = {"other topics", "more_problems"};
-  Seen& seen = seen_[key];
+  Seen& seen = entry_of(topic, reason);
   if (seen.count == 0) {
     seen.detail = detail;
-    spdlog::warn("{}: {}: {} (logged once, counted in diagnostics)", topic, reason, detail);
+    spdlog::warn("{}: {}: {} (logged once, counted)", topic, reason, detail);
   }
   seen.count += times;
 }
@@ -20,9 +25,13 @@ void ProblemCounter::count(const std::string& topic, const std::string& reason,
 void ProblemCounter::count_incompatible(RawReader& reader) {
   const std::uint64_t times = reader.take_incompatible();
   if (times == 0) return;
-  Seen& seen = seen_[{reader.topic(), to_string(InputReason::kIncompatibleQos)}];
-  seen.detail = "a writer does not offer the quality of service that is asked for";
+  Seen& seen = entry_of(reader.topic(), to_string(InputReason::kIncompatibleQos));
+  seen.detail = "a writer does not offer the " + reader.refused_policy() + " that is asked for";
   seen.count += times;
+}
+
+void ProblemCounter::count_damaged(RawReader& reader) {
+  count(reader.topic(), "damaged", "a message that cannot be read", reader.take_damaged());
 }
 
 std::vector<ProblemCounter::Entry> ProblemCounter::entries() const {

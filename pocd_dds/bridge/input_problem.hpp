@@ -25,6 +25,8 @@ class ProblemCounter {
 
   /// Writers that the reader cannot hear; it has logged that itself.
   void count_incompatible(RawReader& reader);
+  /// Messages that the reader took and could not read. From the thread that takes.
+  void count_damaged(RawReader& reader);
 
   struct Entry {
     std::string topic;
@@ -41,6 +43,9 @@ class ProblemCounter {
     std::uint64_t count = 0;
     std::string detail;
   };
+  /// The pair's count, or that of all for which there is no room.
+  Seen& entry_of(const std::string& topic, const std::string& reason);
+
   std::map<std::pair<std::string, std::string>, Seen> seen_;
 };
 

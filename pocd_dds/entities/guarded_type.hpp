@@ -16,7 +16,8 @@ inline std::uint64_t& damaged_payloads() {
 }
 
 /// Of a payload whose type begins with a sequence: whether it can hold as many elements as it says.
-/// Fast CDR makes room for them before it looks.
+/// Fast CDR asks for a byte per element only, and makes room for them all before it reads the
+/// first: a payload of 1 MB would cost as many times sizeof(element).
 inline bool holds_its_sequence(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
                                std::uint32_t element_bytes) {
   constexpr std::uint32_t kHeader = 4, kLength = 4;  // of the encapsulation, of a number
@@ -30,10 +31,11 @@ inline bool holds_its_sequence(const eprosima::fastrtps::rtps::SerializedPayload
   return count <= (payload.length - kHeader - kLength) / element_bytes;
 }
 
-/// Least bytes of an element of the sequence that a type begins with; 0: nothing to check.
+/// Least bytes of an element of the sequence that a type begins with; 0: nothing to check. Other
+/// types have sequences behind other fields; they cost the same factor of what was sent.
 template <class Message, class = void>
 inline constexpr std::uint32_t kElementBytes = 0;
-/// tf2_msgs/TFMessage: stamp, two names, seven numbers.
+/// tf2_msgs/TFMessage, on the topic that most peers write to: stamp, two names, seven numbers.
 template <class Message>
 inline constexpr std::uint32_t
     kElementBytes<Message, std::void_t<decltype(std::declval<Message&>().transforms())>> = 72;

@@ -80,14 +80,17 @@ void apply(const Delivery& delivery, Qos& qos) {
   qos.data_sharing().off();
 }
 
-/// A profile that says nothing of resource limits has Fast DDS's: 10 instances, beyond which
-/// write() fails. Then the table's hold.
+/// A limit that a profile says nothing of is Fast DDS's: 10 instances, beyond which write() fails.
+/// Then the table's holds.
 template <class Qos>
 void lift_limits(const Delivery& delivery, Qos& qos) {
-  if (!(qos.resource_limits() == ResourceLimitsQosPolicy())) return;
-  qos.resource_limits().max_instances = delivery.max_instances;
-  qos.resource_limits().max_samples = delivery.max_samples;
-  qos.resource_limits().max_samples_per_instance = 0;
+  const ResourceLimitsQosPolicy unsaid;
+  ResourceLimitsQosPolicy& limits = qos.resource_limits();
+  if (limits.max_instances == unsaid.max_instances) limits.max_instances = delivery.max_instances;
+  if (limits.max_samples == unsaid.max_samples) limits.max_samples = delivery.max_samples;
+  if (limits.max_samples_per_instance == unsaid.max_samples_per_instance) {
+    limits.max_samples_per_instance = 0;
+  }
 }
 
 }  // namespace
@@ -113,6 +116,19 @@ struct Participant::Impl {
     int users = 0;
   };
   std::map<std::string, UsedTopic> topics;
+
+  std::shared_ptr<Topic> use(const std::string& name) {
+    UsedTopic& used = topics.at(name);
+    ++used.users;
+    return {used.topic, [this, name](Topic*) { end_use(name); }};
+  }
+  void end_use(const std::string& name) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    UsedTopic& used = topics.at(name);
+    if (--used.users > 0) return;
+    // Refused when somebody has left a reader or writer behind; the topic is used again then.
+    if (participant->delete_topic(used.topic) == ReturnCode_t::RETCODE_OK) topics.erase(name);
+  }
 
   ~Impl() {
     if (participant == nullptr) return;
@@ -171,7 +187,7 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
 
 Participant::~Participant() = default;
 
-Topic* Participant::topic(const std::string& name, TypeSupport type) {
+std::shared_ptr<Topic> Participant::topic(const std::string& name, TypeSupport type) {
   // Cyclone DDS 0.10 refuses endpoints that announce type information in Fast DDS's form.
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
@@ -182,24 +198,15 @@ Topic* Participant::topic(const std::string& name, TypeSupport type) {
       throw InputError("topic " + name + " is used with two types, " +
                        known->second.topic->get_type_name() + " and " + type.get_type_name());
     }
-    ++known->second.users;
-    return known->second.topic;
+    return impl_->use(name);
   }
   if (impl_->participant->find_type(type.get_type_name()).empty()) {
     POCD_CHECK(type.register_type(impl_->participant) == ReturnCode_t::RETCODE_OK);
   }
   Topic* topic = impl_->participant->create_topic(name, type.get_type_name(), TOPIC_QOS_DEFAULT);
   if (topic == nullptr) throw InputError("cannot create topic " + name);
-  impl_->topics[name] = {topic, 1};
-  return topic;
-}
-
-void Participant::release_topic(const std::string& name) {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
-  const auto known = impl_->topics.find(name);
-  if (known == impl_->topics.end() || --known->second.users > 0) return;
-  impl_->participant->delete_topic(known->second.topic);
-  impl_->topics.erase(known);
+  impl_->topics[name] = {topic, 0};
+  return impl_->use(name);
 }
 
 DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& delivery) const {

@@ -38,12 +38,10 @@ class Participant {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  /// The topic, made on first use. Throws InputError when the name is taken by another type.
-  eprosima::fastdds::dds::Topic* topic(const std::string& name,
-                                       eprosima::fastdds::dds::TypeSupport type);
-
-  /// Ends one use of topic(); the topic goes with the last.
-  void release_topic(const std::string& name);
+  /// The topic, made on first use; it goes with its last user, who has to have deleted its reader
+  /// or writer by then. Throws InputError when the name is taken by another type.
+  std::shared_ptr<eprosima::fastdds::dds::Topic> topic(const std::string& name,
+                                                       eprosima::fastdds::dds::TypeSupport type);
 
   eprosima::fastdds::dds::DataWriterQos writer_qos(const std::string& topic,
                                                    const Delivery& delivery) const;

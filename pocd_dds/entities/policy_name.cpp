@@ -23,6 +23,10 @@ std::string policy_name(std::int32_t policy) {
       return "reliability";
     case DESTINATIONORDER_QOS_POLICY_ID:
       return "destination order";
+    case DATAREPRESENTATION_QOS_POLICY_ID:
+      return "data representation";
+    case TYPECONSISTENCYENFORCEMENT_QOS_POLICY_ID:
+      return "type consistency enforcement";
     default:
       return "policy " + std::to_string(policy);
   }

@@ -8,6 +8,7 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
 #include <mutex>
 #include <set>
 #include <utility>
@@ -22,14 +23,17 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 struct RawReader::Impl : DataReaderListener {
   std::shared_ptr<Participant> participant;
+  std::shared_ptr<Topic> use;
   DataReader* reader = nullptr;
   Wakeup* wakeup = nullptr;
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
   std::atomic<std::uint64_t> incompatible{0}, told{0}, lost{0};
   std::uint64_t damaged = 0;  // by the thread that takes
-  std::mutex mutex;
+  bool reliable = false;
+  mutable std::mutex mutex;
   std::set<SampleMeta::Guid> writers;
+  std::string refused_policy;
 
   void on_data_available(DataReader*) override { wakeup->wake(); }
   void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
@@ -51,14 +55,21 @@ struct RawReader::Impl : DataReaderListener {
   void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
     lost += static_cast<std::uint64_t>(status.total_count_change);
   }
+  // A reliable writer sends again what found no room; not what is of one instance too many.
   void on_sample_rejected(DataReader*, const SampleRejectedStatus& status) override {
-    lost += static_cast<std::uint64_t>(status.total_count_change);
+    const bool again = reliable && status.last_reason != REJECTED_BY_INSTANCES_LIMIT;
+    if (!again) lost += static_cast<std::uint64_t>(status.total_count_change);
   }
   void on_requested_incompatible_qos(DataReader*,
                                      const RequestedIncompatibleQosStatus& status) override {
+    const std::string policy = policy_name(static_cast<std::int32_t>(status.last_policy_id));
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      refused_policy = policy;
+    }
     if (incompatible.fetch_add(1) == 0) {
       spdlog::warn("{}: a writer does not offer the {} that is asked for: it is not heard", topic,
-                   policy_name(static_cast<std::int32_t>(status.last_policy_id)));
+                   policy);
     }
   }
 };
@@ -71,18 +82,16 @@ RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& 
   impl_->wakeup = &wakeup;
   impl_->topic = topic_;
   Participant& owner = *impl_->participant;
-  impl_->reader = owner.subscriber()->create_datareader(
-      owner.topic(topic_, type), owner.reader_qos(topic_, delivery), impl_.get());
-  if (impl_->reader == nullptr) {
-    owner.release_topic(topic_);
-    throw InputError("cannot create a reader of topic " + topic_);
-  }
+  impl_->use = owner.topic(topic_, type);
+  const DataReaderQos qos = owner.reader_qos(topic_, delivery);
+  impl_->reliable = qos.reliability().kind == RELIABLE_RELIABILITY_QOS;
+  impl_->reader = owner.subscriber()->create_datareader(impl_->use.get(), qos, impl_.get());
+  if (impl_->reader == nullptr) throw InputError("cannot create a reader of topic " + topic_);
 }
 
 RawReader::~RawReader() {
   impl_->reader->set_listener(nullptr);
   impl_->participant->subscriber()->delete_datareader(impl_->reader);
-  impl_->participant->release_topic(topic_);
 }
 
 int RawReader::matched() const { return impl_->matched; }
@@ -96,7 +105,12 @@ std::uint64_t RawReader::take_incompatible() {
   const std::uint64_t count = impl_->incompatible;
   return count - impl_->told.exchange(count);
 }
+std::string RawReader::refused_policy() const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->refused_policy;
+}
 std::uint64_t RawReader::lost() const { return impl_->lost; }
+std::size_t RawReader::unread() const { return impl_->reader->get_unread_count(); }
 
 std::uint64_t RawReader::take_damaged() { return std::exchange(impl_->damaged, 0); }
 void RawReader::wake_again() { impl_->wakeup->wake(); }

@@ -47,8 +47,13 @@ class RawReader {
   std::uint64_t incompatible() const;
   /// Those since the last call.
   std::uint64_t take_incompatible();
-  /// Samples that the bus says were lost on the way.
+  /// What the last one of them does not offer, e.g. "reliability"; "" without any.
+  std::string refused_policy() const;
+  /// Samples that the bus says were lost on the way. One that a reliable reader had no room for
+  /// comes again.
   std::uint64_t lost() const;
+  /// Samples that have arrived and were not taken yet.
+  std::size_t unread() const;
   /// Samples that could not be read since the last call; take() leaves them out. From the thread
   /// that takes.
   std::uint64_t take_damaged();
@@ -80,9 +85,9 @@ class Reader : public RawReader {
   /// The oldest sample not taken yet; false when there is none.
   bool take(Sample& sample, SampleMeta& meta) { return take_raw(&sample, meta); }
 
-  /// Calls `use` with the samples that wait, `most` of them; when there may be more, the wake-up
-  /// comes at once. So a peer that sends faster than its samples are used does not hold everybody
-  /// else up.
+  /// Calls `use` with the samples that wait, at most `most` of them; when there may be more, the
+  /// wake-up comes at once. So a peer that sends faster than its samples are used does not hold
+  /// everybody else up.
   template <class Use>
   void take_some(int most, Use use) {
     Sample sample;

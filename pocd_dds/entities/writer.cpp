@@ -2,9 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
 
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/policy_name.hpp"
@@ -16,6 +18,7 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 struct RawWriter::Impl : DataWriterListener {
   std::shared_ptr<Participant> participant;
+  std::shared_ptr<Topic> use;
   DataWriter* writer = nullptr;
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
@@ -41,18 +44,15 @@ RawWriter::RawWriter(std::shared_ptr<Participant> participant, const TopicSpec& 
   impl_->participant = std::move(participant);
   impl_->topic = topic_;
   Participant& owner = *impl_->participant;
+  impl_->use = owner.topic(topic_, type);
   impl_->writer = owner.publisher()->create_datawriter(
-      owner.topic(topic_, type), owner.writer_qos(topic_, delivery), impl_.get());
-  if (impl_->writer == nullptr) {
-    owner.release_topic(topic_);
-    throw InputError("cannot create a writer of topic " + topic_);
-  }
+      impl_->use.get(), owner.writer_qos(topic_, delivery), impl_.get());
+  if (impl_->writer == nullptr) throw InputError("cannot create a writer of topic " + topic_);
 }
 
 RawWriter::~RawWriter() {
   impl_->writer->set_listener(nullptr);
   impl_->participant->publisher()->delete_datawriter(impl_->writer);
-  impl_->participant->release_topic(topic_);
 }
 
 int RawWriter::matched() const { return impl_->matched; }
@@ -62,6 +62,12 @@ std::uint64_t RawWriter::incompatible() const { return impl_->incompatible; }
 bool RawWriter::wait_acknowledged(std::chrono::milliseconds time) {
   const eprosima::fastrtps::Duration_t limit(static_cast<long double>(time.count()) * 1e-3L);
   return impl_->writer->wait_for_acknowledgments(limit) == ReturnCode_t::RETCODE_OK;
+}
+
+bool RawWriter::wait_acknowledged(std::chrono::steady_clock::time_point end) {
+  const auto left =
+      std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+  return wait_acknowledged(std::max(left, std::chrono::milliseconds(0)));
 }
 
 bool RawWriter::write_raw(void* sample) {

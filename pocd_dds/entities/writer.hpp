@@ -32,6 +32,8 @@ class RawWriter {
   std::uint64_t incompatible() const;
   /// True when every matched reliable reader has everything.
   bool wait_acknowledged(std::chrono::milliseconds time);
+  /// At least once, also when that moment is over; for several writers with one end for all.
+  bool wait_acknowledged(std::chrono::steady_clock::time_point end);
 
  protected:
   bool write_raw(void* sample);

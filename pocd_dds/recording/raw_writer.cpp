@@ -4,6 +4,7 @@
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
 
 #include "pocd/common/check.hpp"
 
@@ -14,9 +15,18 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 struct PayloadWriter::Impl : DataWriterListener {
   std::shared_ptr<Participant> participant;
+  std::shared_ptr<Topic> use;
   Publisher* publisher = nullptr;
   DataWriter* writer = nullptr;
   std::atomic<int> matched{0};
+
+  ~Impl() override {
+    if (writer != nullptr) {
+      writer->set_listener(nullptr);
+      publisher->delete_datawriter(writer);
+    }
+    if (publisher != nullptr) participant->get()->delete_publisher(publisher);
+  }
 
   void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override {
     matched = status.current_count;
@@ -32,8 +42,8 @@ PayloadWriter::PayloadWriter(std::shared_ptr<Participant> participant, const Rec
   for (const std::string& partition : topic.partitions) {
     publisher_qos.partition().push_back(partition.c_str());
   }
-  Topic* dds_topic = owner.topic(
-      topic.name, TypeSupport(new RawType(topic.type, topic.keyed, key_of(topic.type))));
+  impl_->use = owner.topic(topic.name,
+                           TypeSupport(new RawType(topic.type, topic.keyed, key_of(topic.type))));
   impl_->publisher = owner.get()->create_publisher(publisher_qos);
   if (impl_->publisher == nullptr) throw InputError("cannot create a publisher of " + topic.name);
   Delivery delivery;
@@ -52,17 +62,11 @@ PayloadWriter::PayloadWriter(std::shared_ptr<Participant> participant, const Rec
   if (topic.exclusive) qos.ownership().kind = EXCLUSIVE_OWNERSHIP_QOS;
   // Both are recorded, and come back, as what they were.
   qos.writer_data_lifecycle().autodispose_unregistered_instances = false;
-  impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
+  impl_->writer = impl_->publisher->create_datawriter(impl_->use.get(), qos, impl_.get());
   if (impl_->writer == nullptr) throw InputError("cannot create a writer of " + topic.name);
 }
 
-PayloadWriter::~PayloadWriter() {
-  if (impl_->writer != nullptr) {
-    impl_->writer->set_listener(nullptr);
-    impl_->publisher->delete_datawriter(impl_->writer);
-  }
-  if (impl_->publisher != nullptr) impl_->participant->get()->delete_publisher(impl_->publisher);
-}
+PayloadWriter::~PayloadWriter() = default;
 
 int PayloadWriter::matched() const { return impl_->matched; }
 

@@ -9,6 +9,7 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
 #include <set>
 #include <thread>
 
@@ -158,6 +159,7 @@ struct Recorder::Impl {
     RecordedTopic topic;  // the weakest quality of service seen
     std::uint16_t channel = 0;
     std::optional<std::uint16_t> instances;
+    std::shared_ptr<Topic> use;
     Subscriber* subscriber = nullptr;
     DataReader* reader = nullptr;
     std::unique_ptr<Tap> tap;
@@ -245,7 +247,7 @@ void Recorder::Impl::open_reader(Line& line) {
   const RecordedTopic& topic = line.topic;
   try {
     const KeyOf key = key_of(topic.type);
-    Topic* dds_topic =
+    line.use =
         participant->topic(topic.name, TypeSupport(new RawType(topic.type, topic.keyed, key)));
     SubscriberQos subscriber_qos = SUBSCRIBER_QOS_DEFAULT;
     for (const std::string& partition : topic.partitions) {
@@ -266,7 +268,7 @@ void Recorder::Impl::open_reader(Line& line) {
     line.tap =
         std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key),
                               topic.transient_local && options.split.splits());
-    line.reader = line.subscriber->create_datareader(dds_topic, qos, line.tap.get());
+    line.reader = line.subscriber->create_datareader(line.use.get(), qos, line.tap.get());
     if (line.reader == nullptr) throw InputError("cannot create a reader");
   } catch (const InputError& error) {
     spdlog::error("{}: is not recorded: {}", topic.name, error.what());
@@ -284,6 +286,7 @@ void Recorder::Impl::close_reader(Line& line) {
   }
   line.reader = nullptr;
   line.subscriber = nullptr;
+  line.use.reset();
 }
 
 void Recorder::Impl::close_readers() {

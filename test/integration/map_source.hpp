@@ -1,8 +1,6 @@
 // A map that changes at random and is published by the node's own code, in the test's process.
 #pragma once
 
-#include <fastrtps/xmlparser/XMLProfileManager.h>
-
 #include <atomic>
 #include <map>
 #include <memory>
@@ -11,20 +9,13 @@
 #include <thread>
 
 #include "bus_harness.hpp"
+#include "over_the_bus.hpp"
 #include "pocd/common/random.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 
 namespace pocd {
-
-/// Participants of one process talk as those of several do, from here on: Fast DDS would hand
-/// samples over directly, past transports and flow control.
-inline void talk_over_the_bus() {
-  eprosima::fastrtps::LibrarySettingsAttributes settings;
-  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
-}
 
 /// Blocks of noise, which hardly compress: a tile has some 4 KB per block.
 inline void fill_block(TsdfMap& map, const BlockKey& key, Random& random) {

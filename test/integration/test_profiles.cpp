@@ -1,10 +1,16 @@
 // What an operator's XML profiles replace, and the check of the machine's socket buffers.
 #include <gtest/gtest.h>
 
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
 #include <fstream>
 
 #include "bus_harness.hpp"
+#include "nav_msgsPubSubTypes.h"
+#include "pocd/common/check.hpp"
 #include "pocd_dds/entities/socket_buffers.hpp"
+#include "pocd_dds/entities/writer.hpp"
+#include "sensor_msgsPubSubTypes.h"
 
 namespace pocd {
 namespace {
@@ -67,6 +73,53 @@ TEST(Profiles, ReplaceParticipantReadersAndWriters) {
   EXPECT_EQ(participant.writer_qos(tiles.name, tiles.delivery).publish_mode().kind,
             ASYNCHRONOUS_PUBLISH_MODE)
       << "topics without a profile stay as the table has them";
+}
+
+TEST(Profiles, ALimitThatTheyDoNotNameIsTheTables) {
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "profiles.xml";
+  std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <data_writer profile_name="pocd/objects"><topic>
+    <resourceLimitsQos><max_samples>30000</max_samples></resourceLimitsQos></topic></data_writer>
+</profiles>)";
+  const dds::Participant participant({domain.number(), file.string(), "ours"});
+  const auto& objects = dds::topics::kObjects;
+  const DataWriterQos qos = participant.writer_qos(objects.name, objects.delivery);
+  EXPECT_EQ(qos.resource_limits().max_samples, 30000);
+  EXPECT_EQ(qos.resource_limits().max_instances, objects.delivery.max_instances);
+}
+
+TEST(Participant, ATopicGoesWithItsLastUser) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  using Odometry = nav_msgs::msg::OdometryPubSubType;
+  using Image = sensor_msgs::msg::ImagePubSubType;
+  const auto odometry = [&] {
+    return std::make_unique<dds::Writer<Odometry>>(bus, dds::topics::kOdometry, "rt/x",
+                                                   dds::topics::best_effort(1));
+  };
+  const auto image = [&] {
+    return std::make_unique<dds::Writer<Image>>(bus, dds::topics::kDepth, "rt/x",
+                                                dds::topics::best_effort(1));
+  };
+  {
+    const auto one = odometry(), other = odometry();
+    EXPECT_THROW(image(), InputError);
+  }
+  {
+    const auto one = image();
+    EXPECT_THROW(odometry(), InputError);
+  }
+  // A topic that cannot go, because something was left on it, can be used again.
+  DataWriter* left = nullptr;
+  {
+    const auto use = bus->topic("rt/x", TypeSupport(new dds::GuardedType<Image>()));
+    left = bus->publisher()->create_datawriter(use.get(), DATAWRITER_QOS_DEFAULT);
+  }
+  EXPECT_NO_THROW(image());
+  bus->publisher()->delete_datawriter(left);
 }
 
 TEST(SocketBuffers, SayWhatToSetWhenTheyAreSmall) {
