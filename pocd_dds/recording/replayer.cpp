@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <set>
 #include <thread>
 
 #include "pocd/common/check.hpp"
@@ -12,6 +11,7 @@
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/recording/keyboard.hpp"
 #include "pocd_dds/recording/raw_writer.hpp"
+#include "pocd_dds/recording/replay_topics.hpp"
 #include "rosgraph_msgsPubSubTypes.h"
 
 namespace pocd::dds {
@@ -33,9 +33,9 @@ struct Route {
 };
 
 /// The speed of time: log times to moments, with pauses taken out.
-class Pace {
+class ReplayPace {
  public:
-  explicit Pace(std::optional<double> speed) : speed_(speed) {}
+  explicit ReplayPace(std::optional<double> speed) : speed_(speed) {}
   void start(std::uint64_t log_ns) {
     first_ns_ = log_ns;
     start_ = Clock::now();
@@ -60,12 +60,8 @@ class Pace {
 struct Replayer::Impl {
   explicit Impl(const ReplayOptions& replay_options);
 
-  void add_channel(const RecordedChannel& channel);
   void make_writers();
   void next_round(const std::atomic<bool>& stop);
-  void refuse_typos(const std::vector<RecordedTopic>& recorded) const;
-  bool selected(const RecordedTopic& topic) const;
-  RecordedTopic renamed(RecordedTopic topic) const;
   Route route_of(const RecordedChannel& channel) const;
   void select(RecordingReader& reader, bool latched_only) const;
   std::string waiting() const;
@@ -78,125 +74,56 @@ struct Replayer::Impl {
   static bool acknowledged(PayloadWriter& writer, const std::atomic<bool>& stop,
                            Clock::time_point deadline = Clock::time_point::max());
 
-  /// One line of topic and partitions.
-  using Key = std::pair<std::string, std::vector<std::string>>;
-
   ReplayOptions options;
   std::shared_ptr<Participant> participant;
   std::vector<std::filesystem::path> files;
-  std::map<Key, RecordedTopic> topics;  // as recorded
-  std::map<Key, std::unique_ptr<PayloadWriter>> writers;
+  ReplayTopics topics;
+  std::map<ReplayTopics::Key, std::unique_ptr<PayloadWriter>> writers;
   std::vector<Route> routes;  // of the file being played, by channel
   std::unique_ptr<Writer<rosgraph_msgs::msg::ClockPubSubType>> clock;
   std::uint64_t start_ns = 0;
-  Pace pace;
+  ReplayPace pace;
   bool paced = false;
   Keyboard keyboard;
   ReplayResult result;
 };
 
 Replayer::Impl::Impl(const ReplayOptions& replay_options)
-    : options(replay_options), pace(options.speed), keyboard(options.keyboard) {
+    : options(replay_options), topics(options), pace(options.speed), keyboard(options.keyboard) {
   for (const auto& input : options.inputs) {
     for (const auto& file : recording::recording_files(input)) files.push_back(file);
   }
   if (files.empty()) throw InputError("no recording given");
   bool first = true;
-  std::vector<RecordedTopic> recorded;
   for (const auto& file : files) {
     const auto reader = recording::open_recording(file);
     for (const std::string& problem : reader->problems()) spdlog::warn("{}", problem);
-    for (const RecordedChannel& channel : reader->channels()) {
-      add_channel(channel);
-      const std::optional<RecordedTopic> topic = topic_of(channel);
-      if (topic && instances_of(channel).empty()) recorded.push_back(*topic);
-    }
+    for (const RecordedChannel& channel : reader->channels()) topics.add(channel);
     if (first && reader->info().messages > 0) {
       start_ns = reader->info().start_ns;
       first = false;
     }
   }
-  if (topics.empty()) {
-    throw InputError(files.front().string() + ": holds no topic that matches and can be played");
+  topics.refuse_typos();
+  if (topics.played().empty()) {
+    throw InputError(files.front().string() + ": holds no topic that can be played");
   }
-  refuse_typos(recorded);
   participant = std::make_shared<Participant>(options.bus);
-  if (options.clock && topics.count({"rt/clock", {}}) == 0) {
+  if (options.clock && topics.played().count({"rt/clock", {}}) == 0) {
     clock =
         std::make_unique<Writer<rosgraph_msgs::msg::ClockPubSubType>>(participant, topics::kClock);
   }
   make_writers();
 }
 
-/// A pattern that matches nothing is a mistake that would show in the map only.
-void Replayer::Impl::refuse_typos(const std::vector<RecordedTopic>& recorded) const {
-  const auto names = [&](const auto& list, const auto& name_of) {
-    std::set<std::string> unique;
-    for (const auto& entry : list) unique.insert(name_of(entry));
-    std::string text;
-    for (const std::string& name : unique) text += (text.empty() ? "" : ", ") + name;
-    return text;
-  };
-  const auto of_topic = [](const RecordedTopic& topic) { return recorded_name(topic.name); };
-  const auto of_entry = [](const auto& entry) { return recorded_name(entry.second.name); };
-  for (const auto& [from, to] : options.remap) {
-    const bool known =
-        std::any_of(topics.begin(), topics.end(),
-                    [&, name = from](const auto& topic) { return of_entry(topic) == name; });
-    if (known) continue;
-    throw InputError("--remap " + from + ": no such topic is played, only " +
-                     names(topics, of_entry));
-  }
-  for (const std::string& pattern : options.wait_for) {
-    const bool known = std::any_of(topics.begin(), topics.end(), [&](const auto& topic) {
-      return topic_matches(pattern, topic.second);
-    });
-    if (known) continue;
-    throw InputError("--wait-for " + pattern + ": matches no topic that is played, only " +
-                     names(topics, of_entry));
-  }
-  for (const std::string& pattern : options.topics) {
-    const bool known = std::any_of(recorded.begin(), recorded.end(), [&](const auto& topic) {
-      return topic_matches(pattern, topic);
-    });
-    if (known) continue;
-    throw InputError("--topics " + pattern + ": matches none of " + names(recorded, of_topic));
-  }
-}
-
-bool Replayer::Impl::selected(const RecordedTopic& topic) const {
-  return options.topics.empty() ||
-         std::any_of(options.topics.begin(), options.topics.end(),
-                     [&](const std::string& pattern) { return topic_matches(pattern, topic); });
-}
-
-RecordedTopic Replayer::Impl::renamed(RecordedTopic topic) const {
-  const auto to = options.remap.find(recorded_name(topic.name));
-  if (to != options.remap.end()) {
-    topic.name = (to->second.rfind('/', 0) == 0 ? "rt" : "") + to->second;
-  }
-  return topic;
-}
-
-void Replayer::Impl::add_channel(const RecordedChannel& channel) {
-  if (!instances_of(channel).empty()) return;
-  const std::optional<RecordedTopic> topic = topic_of(channel);
-  if (!topic || !selected(*topic)) return;
-  const auto [entry, fresh] = topics.try_emplace({topic->name, topic->partitions}, *topic);
-  if (!fresh && entry->second.type != topic->type) {
-    spdlog::warn("{}: recorded with two types, {} and {}; only the first is played", topic->name,
-                 entry->second.type, topic->type);
-  }
-}
-
 void Replayer::Impl::make_writers() {
   // Latched topics last: endpoints are announced in the order of their making, so a reader that
   // acknowledges one of them (tf_static is a recording's first message) knows all others.
   for (const bool latched : {false, true}) {
-    for (const auto& [key, topic] : topics) {
+    for (const auto& [key, topic] : topics.played()) {
       if (topic.transient_local != latched) continue;
-      writers.emplace(
-          key, std::make_unique<PayloadWriter>(participant, renamed(topic), options.lossless));
+      writers.emplace(key, std::make_unique<PayloadWriter>(participant, topics.renamed(topic),
+                                                           options.lossless));
     }
   }
 }
@@ -207,9 +134,10 @@ Route Replayer::Impl::route_of(const RecordedChannel& channel) const {
   const std::string of = instances_of(channel);
   const bool instances = !of.empty();
   if (instances) topic->name = (of.rfind('/', 0) == 0 ? "rt" : "") + of;
-  const Key key{topic->name, topic->partitions};
+  const ReplayTopics::Key key{topic->name, topic->partitions};
   const auto writer = writers.find(key);
-  if (writer == writers.end() || !(instances || topics.at(key).type == topic->type)) return {};
+  if (writer == writers.end() || !(instances || topics.played().at(key).type == topic->type))
+    return {};
   return {writer->second.get(), instances};
 }
 
@@ -236,7 +164,7 @@ std::string Replayer::Impl::waiting() const {
   bool named = false;
   for (const auto& [key, writer] : writers) {
     any = any || writer->matched() >= options.readers;
-    if (!wanted(topics.at(key))) continue;
+    if (!wanted(topics.played().at(key))) continue;
     named = true;
     if (writer->matched() < options.readers) missing = writer->topic().name;
   }
@@ -365,9 +293,10 @@ void Replayer::Impl::play_pass(const std::atomic<bool>& stop) {
 
 /// Stamps go back to the beginning, which subscribers take of a new source only.
 void Replayer::Impl::next_round(const std::atomic<bool>& stop) {
+  const auto deadline = Clock::now() + kLastAcknowledgement;
   for (const auto& [key, writer] : writers) {
     const bool reliable = options.lossless || writer->topic().reliable;
-    if (reliable) acknowledged(*writer, stop, Clock::now() + kLastAcknowledgement);
+    if (reliable) acknowledged(*writer, stop, deadline);
   }
   writers.clear();
   const auto until = Clock::now() + kBetweenRounds;

@@ -191,6 +191,17 @@ void write_foreign(const fs::path& file) {
   writer.close();
 }
 
+TEST(RecordReplay, APatternThatMatchesNothingIsNamed) {
+  const Folder folder;
+  write_foreign(folder / "run.mcap");
+  const CommandResult result =
+      run_command({command("pocd_play"), (folder / "run.mcap").string(), "--topics", "/dpeth"});
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_NE(result.err.find("--topics /dpeth: matches none of best_effort, keyed, plain"),
+            std::string::npos)
+      << result.err;
+}
+
 TEST(RecordReplay, UnknownTypesPartitionsAndDisposesComeBack) {
   const Folder folder;
   write_foreign(folder / "first.mcap");
