@@ -3,6 +3,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdio>
+#include <initializer_list>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -13,6 +14,7 @@
 #include "mirror/publishers.hpp"
 #include "mirror/shared_participant.hpp"
 #include "pocd/map/map_follower.hpp"
+#include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
@@ -26,6 +28,7 @@ using Clock = std::chrono::steady_clock;
 namespace msg = pocd_msgs::msg;
 
 constexpr std::chrono::milliseconds kIdle{50};
+constexpr int kMost = 1000;  // samples of a topic in one turn, so that no peer holds up the others
 
 std::array<std::uint8_t, 16> random_id() {
   std::random_device device;
@@ -88,6 +91,7 @@ struct MapMirror::Impl {
   void forget_objects_of(std::uint64_t epoch);
   void take_tiles();
   void catch_up();
+  void count_damaged();
   void ask();
   MirrorStatus status_now() const;
 
@@ -120,6 +124,7 @@ struct MapMirror::Impl {
       reply_parts;
   std::pair<std::uint64_t, std::uint64_t> last_at{0, 0};
   std::uint64_t asked = 0, damaged = 0;
+  dds::ProblemCounter problems;
 
   std::atomic<bool> stopping{false};
   std::thread thread;
@@ -136,6 +141,7 @@ void MapMirror::Impl::run() {
       take_replies();
       take_manifests();
       take_tiles();
+      count_damaged();
       catch_up();
     }
     changed.notify_all();
@@ -143,15 +149,13 @@ void MapMirror::Impl::run() {
 }
 
 void MapMirror::Impl::take_objects() {
-  msg::ObjectState state;
-  dds::SampleMeta meta;
-  while (object_states.take(state, meta)) {
+  object_states.take_some(kMost, [&](const msg::ObjectState& state, const dds::SampleMeta& meta) {
     if (meta.valid) {
       if (state.map_id() == options.map_id) objects[state.uuid()] = state;
     } else if (meta.disposed) {
       objects.erase(meta.key);
     }
-  }
+  });
 }
 
 void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
@@ -161,22 +165,18 @@ void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
 }
 
 void MapMirror::Impl::take_events() {
-  msg::ObjectEvent message;
-  dds::SampleMeta meta;
-  while (events.take(message, meta)) {
+  events.take_some(kMost, [&](const msg::ObjectEvent& message, const dds::SampleMeta& meta) {
     if (meta.valid && options.on_event && message.map_id() == options.map_id) {
       options.on_event(dds::event_from(message), message.class_name());
     }
-  }
+  });
 }
 
 void MapMirror::Impl::take_manifests() {
-  msg::MapManifest message;
-  dds::SampleMeta meta;
-  while (manifests.take(message, meta)) {
-    if (!meta.valid || message.map_id() != options.map_id) continue;
+  manifests.take_some(kMost, [&](const msg::MapManifest& message, const dds::SampleMeta& meta) {
+    if (!meta.valid || message.map_id() != options.map_id) return;
     if (!publishers.heard(meta.writer, message.epoch(), message.final_version(), Clock::now())) {
-      continue;
+      return;
     }
     if (manifest && manifest->epoch() != message.epoch()) {
       forget_objects_of(manifest->epoch());
@@ -186,58 +186,52 @@ void MapMirror::Impl::take_manifests() {
     }
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
-  }
+  });
   publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },
                          Clock::now());
 }
 
 void MapMirror::Impl::take_deltas() {
-  msg::MapDelta message;
-  dds::SampleMeta meta;
-  while (deltas.take(message, meta)) {
-    if (!meta.valid || !ours(message)) continue;
+  deltas.take_some(kMost, [&](const msg::MapDelta& message, const dds::SampleMeta& meta) {
+    if (!meta.valid || !ours(message)) return;
     if (follower.follows(message.epoch(), message.base_version())) plan.progress(Clock::now());
     const auto parts = delta_parts.add({message.epoch(), message.version()}, message);
-    if (!parts) continue;
+    if (!parts) return;
     std::optional<MapDelta> delta = dds::delta_from(*parts);
     if (delta) {
       follower.delta(std::move(*delta));
     } else {
       ++damaged;
     }
-  }
+  });
 }
 
 void MapMirror::Impl::take_replies() {
   if (!replies) return;
-  msg::MapSnapshotReply message;
-  dds::SampleMeta meta;
-  while (replies->take(message, meta)) {
-    if (!meta.valid || !ours(message)) continue;
+  replies->take_some(kMost, [&](const msg::MapSnapshotReply& message, const dds::SampleMeta& meta) {
+    if (!meta.valid || !ours(message)) return;
     // Others ask, too: what this copy has no use for is not kept.
-    if (!follower.needs(dds::snapshot_header(message))) continue;
+    if (!follower.needs(dds::snapshot_header(message))) return;
     plan.progress(Clock::now());
     const auto parts =
         reply_parts.add({message.epoch(), message.version(), message.base_version()}, message);
-    if (!parts) continue;
+    if (!parts) return;
     std::optional<MapSnapshot> snapshot = dds::snapshot_from(*parts);
     if (snapshot) {
       follower.snapshot(std::move(*snapshot));
     } else {
       ++damaged;
     }
-  }
+  });
 }
 
 void MapMirror::Impl::take_tiles() {
   if (!tiles) return;
-  msg::MapTile message;
-  dds::SampleMeta meta;
-  while (tiles->take(message, meta)) {
+  tiles->take_some(kMost, [&](const msg::MapTile& message, const dds::SampleMeta& meta) {
     // One that is new leads on; changes of known ones go on for ever.
     if (tile_of_instance.count(meta.key) == 0) plan.progress(Clock::now());
     if (meta.valid) {
-      if (!ours(message)) continue;
+      if (!ours(message)) return;
       epoch_of_writer[meta.writer] = message.epoch();
       tile_of_instance[meta.key] = {message.x(), message.y(), message.z()};
       std::optional<MapTile> tile = dds::tile_from(message);
@@ -249,9 +243,16 @@ void MapMirror::Impl::take_tiles() {
     } else if (meta.disposed) {
       const auto epoch = epoch_of_writer.find(meta.writer);
       const auto tile = tile_of_instance.find(meta.key);
-      if (epoch == epoch_of_writer.end() || tile == tile_of_instance.end()) continue;
+      if (epoch == epoch_of_writer.end() || tile == tile_of_instance.end()) return;
       follower.tile_gone(epoch->second, tile->second);
     }
+  });
+}
+
+void MapMirror::Impl::count_damaged() {
+  for (dds::RawReader* reader : std::initializer_list<dds::RawReader*>{
+           &manifests, &deltas, &object_states, &events, replies.get(), tiles.get()}) {
+    if (reader != nullptr) problems.count_damaged(*reader);
   }
 }
 
@@ -307,7 +308,7 @@ MirrorStatus MapMirror::Impl::status_now() const {
   const FollowerCounts& counts = follower.counts();
   status.deltas = counts.deltas;
   status.gaps = counts.gaps;
-  status.corrupt = counts.corrupt + damaged;
+  status.corrupt = counts.corrupt + damaged + problems.total();
   status.snapshots_asked = asked;
   status.snapshots_taken = counts.snapshots;
   status.gathered = counts.gathered;

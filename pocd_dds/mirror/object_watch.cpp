@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <initializer_list>
 #include <iterator>
 #include <map>
 #include <mutex>
@@ -9,6 +10,7 @@
 #include <thread>
 
 #include "mirror/shared_participant.hpp"
+#include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_msgsPubSubTypes.h"
@@ -17,6 +19,7 @@ namespace pocd {
 namespace {
 
 constexpr std::chrono::milliseconds kIdle{50};
+constexpr int kMost = 1000;  // samples of a topic in one turn, so that no peer holds up the others
 
 /// With the last sample only, a dispose would take the place of a state that was not read yet, and
 /// a state that of the one before.
@@ -65,6 +68,7 @@ struct ObjectWatch::Impl {
   std::mutex mutex;                            // guards publishers
   std::set<dds::SampleMeta::Guid> publishers;  // writers of this map's manifest, of runs that go on
   std::pair<int, int> matched_before{0, 0};
+  dds::ProblemCounter problems;  // tells of the first on stderr
   std::atomic<bool> stopping{false};
   std::thread thread;
 };
@@ -75,23 +79,25 @@ void ObjectWatch::Impl::run() {
     take_states();
     take_events();
     take_manifests();
+    for (dds::RawReader* reader :
+         std::initializer_list<dds::RawReader*>{&states, &events, &manifests}) {
+      problems.count_damaged(*reader);
+    }
   }
 }
 
 void ObjectWatch::Impl::take_states() {
-  pocd_msgs::msg::ObjectState state;
-  dds::SampleMeta meta;
   bool taken = false;
-  while (states.take(state, meta)) {
+  states.take_some(kMost, [&](const auto& state, const dds::SampleMeta& meta) {
     if (meta.disposed) gone(meta.key, Gone::kRemoved);
     // Not valid and not disposed: its node has gone, which says nothing about the object.
-    if (!meta.valid || state.map_id() != options.map_id) continue;
+    if (!meta.valid || state.map_id() != options.map_id) return;
     taken = true;
     Known& entry = known[state.uuid()];
     entry = {{state.uuid(), state.epoch(), state.class_name(), dds::object_from(state)},
              meta.writer};
     if (options.on_object) options.on_object(entry.object);
-  }
+  });
   // The bus may tell of a writer after its first sample.
   const std::pair<int, int> matched{states.matched(), states.ever_matched()};
   if (taken || matched != matched_before) forget_replaced();
@@ -116,19 +122,15 @@ void ObjectWatch::Impl::gone(const std::array<std::uint8_t, 16>& uuid, Gone why)
 }
 
 void ObjectWatch::Impl::take_events() {
-  pocd_msgs::msg::ObjectEvent message;
-  dds::SampleMeta meta;
-  while (events.take(message, meta)) {
-    if (!meta.valid || !options.on_event || message.map_id() != options.map_id) continue;
+  events.take_some(kMost, [&](const auto& message, const dds::SampleMeta& meta) {
+    if (!meta.valid || !options.on_event || message.map_id() != options.map_id) return;
     options.on_event(dds::event_from(message), message.class_name());
-  }
+  });
 }
 
 void ObjectWatch::Impl::take_manifests() {
-  pocd_msgs::msg::MapManifest message;
-  dds::SampleMeta meta;
-  while (manifests.take(message, meta)) {
-    if (!meta.valid || message.map_id() != options.map_id) continue;
+  manifests.take_some(kMost, [&](const auto& message, const dds::SampleMeta& meta) {
+    if (!meta.valid || message.map_id() != options.map_id) return;
     const std::lock_guard<std::mutex> lock(mutex);
     for (auto writer = publishers.begin(); writer != publishers.end();) {
       writer = manifests.has_writer(*writer) ? std::next(writer) : publishers.erase(writer);
@@ -138,7 +140,7 @@ void ObjectWatch::Impl::take_manifests() {
     } else {
       publishers.insert(meta.writer);
     }
-  }
+  });
 }
 
 ObjectWatch::ObjectWatch(const ObjectWatchOptions& options)

@@ -48,7 +48,8 @@ struct MirrorStatus {
   std::size_t publishers = 0;
   bool publisher_seen = false;  ///< at any time
   bool final_version = false;   ///< the publisher has ended its run in order, at this version
-  std::uint64_t deltas = 0, gaps = 0, corrupt = 0;
+  std::uint64_t deltas = 0, gaps = 0;
+  std::uint64_t corrupt = 0;  ///< messages, of any topic, that could not be read or used
   std::uint64_t snapshots_asked = 0, snapshots_taken = 0;
   std::uint64_t gathered = 0;  ///< times that the copy was made of single tiles
 };
