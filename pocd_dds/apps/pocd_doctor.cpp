@@ -26,25 +26,29 @@ struct DoctorOptions {
 
 void add(Findings& to, const Findings& more) { to.insert(to.end(), more.begin(), more.end()); }
 
+/// Errors of a configuration come a line each.
+void add_lines(Findings& findings, const pocd::InputError& error) {
+  std::istringstream lines(error.what());
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty()) continue;
+    findings.push_back({Severity::kError, "configuration", line,
+                        "docs/parameters.md and docs/node_parameters.md list what there is"});
+  }
+}
+
 /// Loads what can be loaded; every error is a finding.
 Findings check_configuration(const DoctorOptions& options, NodeFile& config) {
   Findings findings;
   try {
     pocd::load_config(config, options.files, options.overrides);
   } catch (const pocd::InputError& error) {
-    std::istringstream lines(error.what());
-    for (std::string line; std::getline(lines, line);) {
-      if (!line.empty()) {
-        findings.push_back({Severity::kError, "configuration", line,
-                            "docs/parameters.md and docs/node_parameters.md list what there is"});
-      }
-    }
+    add_lines(findings, error);
     config = NodeFile{};
   }
   try {
     config.node.set_robots(options.robots);
   } catch (const pocd::InputError& error) {
-    findings.push_back({Severity::kError, "configuration", error.what(), "see docs/fleet.md"});
+    add_lines(findings, error);
   }
   return findings;
 }

@@ -21,7 +21,9 @@ class FrameLog {
   void dropped(const DroppedFrame& frame) { write(frame, 0, 1); }
 
   std::uint64_t failures() const { return writer_.failures(); }
-  bool wait_acknowledged(std::chrono::milliseconds time) { return writer_.wait_acknowledged(time); }
+  bool wait_acknowledged(std::chrono::steady_clock::time_point end) {
+    return writer_.wait_acknowledged(end);
+  }
 
  private:
   void write(const DroppedFrame& frame, std::uint64_t order, std::uint8_t outcome) {

@@ -100,45 +100,68 @@ void Intake::check_type(const BusEvent& event) {
 
 void Intake::follow(const std::vector<RosterChange>& changes) {
   for (const RosterChange& change : changes) {
-    const auto known = robots_.find(change.robot);
     if (!change.present) {
-      spdlog::warn("{}: has gone: {}", change.robot, change.reason);
-      departures_.push_back({change.robot, change.reason, wall_clock_ns()});
-      if (departures_.size() > kMostDepartures) departures_.pop_front();
-      if (known != robots_.end()) known->second.announced = false;
-      continue;
-    }
-    if (known == robots_.end() && robots_.size() >= kMostRobots) {
+      go(change);
+    } else if (robots_.count(change.robot) == 0 && robots_.size() >= kMostRobots) {
+      turned_away_.insert(change.robot);
       problems_.count(robot_topic(node_.topics.depth, change.robot), "too_many_robots",
                       "there are " + std::to_string(kMostRobots) + " already: not listened to", 1);
-      continue;
+    } else {
+      come(change.robot);
     }
-    if (known == robots_.end()) {
-      RobotConfig config;
-      config.name = change.robot;
-      try {
-        meet(change.robot, config, false);
-      } catch (const InputError& error) {
-        robots_.erase(change.robot);
-        problems_.count(robot_topic(node_.topics.depth, change.robot),
-                        {InputReason::kWrongType, error.what()});
-        continue;
-      }
+  }
+  meet_those_turned_away();
+}
+
+void Intake::go(const RosterChange& change) {
+  turned_away_.erase(change.robot);
+  const auto known = robots_.find(change.robot);
+  if (known == robots_.end()) return;  // was not listened to
+  spdlog::warn("{}: has gone: {}", change.robot, change.reason);
+  departures_.push_back({change.robot, change.reason, wall_clock_ns()});
+  if (departures_.size() > kMostDepartures) departures_.pop_front();
+  known->second.announced = false;
+}
+
+void Intake::come(const std::string& name) {
+  if (robots_.count(name) == 0) {
+    RobotConfig config;
+    config.name = name;
+    try {
+      meet(name, config, false);
+    } catch (const InputError& error) {
+      robots_.erase(name);
+      problems_.count(robot_topic(node_.topics.depth, name), "no_reader", error.what(), 1);
+      return;
     }
-    robots_[change.robot].announced = true;
-    spdlog::info("{}: is on the bus", change.robot);
+  }
+  robots_[name].announced = true;
+  spdlog::info("{}: is on the bus", name);
+}
+
+void Intake::meet_those_turned_away() {
+  while (!turned_away_.empty() && robots_.size() < kMostRobots) {
+    const std::string name = *turned_away_.begin();
+    turned_away_.erase(turned_away_.begin());
+    come(name);
   }
 }
 
 void Intake::step(bool last) {
   follow_roster();
-  if (tf_) tf_->drain(transforms_, problems_);
+  for (auto& [name, robot] : robots_) {
+    const bool far_ahead = node_.lossless && merger_.pending(name) >= kMostBehind;
+    robot.input->look(last        ? RobotInput::Turn::kLast
+                      : far_ahead ? RobotInput::Turn::kHold
+                                  : RobotInput::Turn::kUsual);
+  }
+  std::set<std::string> moved;
+  if (tf_) moved = tf_->drain(transforms_, problems_);
   for (auto it = robots_.begin(); it != robots_.end();) {
     const auto& [name, robot] = *it;
     RobotInput& input = *robot.input;
-    const bool hold = node_.lossless && !last && merger_.pending(name) >= kMostBehind;
-    input.drain(hold);
-    for (Frame& frame : input.take(last)) {
+    input.drain(moved);
+    for (Frame& frame : input.take()) {
       const StampNs stamp_ns = frame.stamp_ns;
       merger_.add(name, stamp_ns, std::move(frame));
     }

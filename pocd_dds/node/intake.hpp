@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -80,6 +81,10 @@ class Intake {
   void check_type(const BusEvent& event);
   void follow(const std::vector<RosterChange>& changes);
   void meet(const std::string& name, const RobotConfig& config, bool named);
+  void come(const std::string& name);
+  void go(const RosterChange& change);
+  /// While there is room, those who were turned away before.
+  void meet_those_turned_away();
   /// True when nothing of the robot is left here and it is to be erased.
   bool see_off(const Robot& robot);
   void hand_over(bool last);
@@ -98,6 +103,7 @@ class Intake {
   TransformTree transforms_;            ///< of the topics that all robots share
   std::unique_ptr<TransformInput> tf_;  ///< null when every robot has its own
   std::map<std::string, Robot> robots_;
+  std::set<std::string> turned_away_;  ///< on the bus, but there was no room
   std::deque<RobotDeparture> departures_;
   double departed_take_cpu_ms_ = 0.0;
   std::uint64_t departed_frames_ = 0, departed_dropped_ = 0;

@@ -79,18 +79,20 @@ void MapPublication::send_waiting() {
 }
 
 bool MapPublication::send_delta() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  if (deltas_waiting_.empty()) return false;
-  DeltaParts& step = deltas_waiting_.front();  // stays where it is: the other thread only appends
-  auto message = step.next();
-  lock.unlock();
+  DeltaParts* step = nullptr;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (deltas_waiting_.empty()) return false;
+    step = &deltas_waiting_.front();  // this thread's: the other one only appends
+  }
+  auto message = step->next();
   budget_.spend(network_bytes(payload_bytes(message), deltas_));
   deltas_.write(message);  // one that is refused is a gap, which mirrors repair
-  lock.lock();
-  if (step.left() > 0) return true;
+  if (step->left() > 0) return true;
+  const std::lock_guard<std::mutex> lock(mutex_);
   deltas_waiting_.pop_front();
   if (deltas_waiting_.empty()) {
-    announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size()};
+    announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size(), stamp_ns_};
   }
   return true;
 }
@@ -136,10 +138,7 @@ void MapPublication::send_manifest(std::size_t objects, bool final_version) {
   manifest.map_id(map_id_);
   manifest.epoch(publisher_.epoch());
   manifest.version(announced_.version);
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    manifest.stamp(to_time(stamp_ns_));
-  }
+  manifest.stamp(to_time(announced_.stamp_ns));
   manifest.frame_id(config_.node.map_frame);
   manifest.voxel_size(config_.pipeline.map.voxel_size_m);
   manifest.truncation(config_.pipeline.map.truncation_m());
@@ -180,6 +179,11 @@ void MapPublication::answer_requests() {
   wanted_.reset();
 }
 
+void MapPublication::count_problems(ProblemCounter& problems) {
+  problems.count_incompatible(requests_);
+  problems.count_damaged(requests_);
+}
+
 std::size_t MapPublication::waiting() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::size_t messages = tiles_waiting_.size() + (reply_waiting_ ? reply_waiting_->left() : 0);
@@ -199,21 +203,15 @@ MapTraffic MapPublication::traffic() const {
           step_bytes_,          snapshot_bytes_,           snapshots_,         messages};
 }
 
-bool MapPublication::wait_acknowledged(std::chrono::milliseconds time) {
-  const auto end = std::chrono::steady_clock::now() + time;
+bool MapPublication::wait_acknowledged(std::chrono::steady_clock::time_point end) {
   for (;; std::this_thread::sleep_for(kTurn)) {
     answer_requests();
     send_waiting();
     if (waiting() == 0 && (!wanted_ || replies_.matched() == 0)) break;
     if (std::chrono::steady_clock::now() >= end) return false;
   }
-  const auto left = [&] {
-    const auto rest = end - std::chrono::steady_clock::now();
-    return std::max(std::chrono::duration_cast<std::chrono::milliseconds>(rest),
-                    std::chrono::milliseconds(0));
-  };
-  return deltas_.wait_acknowledged(left()) && tiles_.wait_acknowledged(left()) &&
-         manifest_.wait_acknowledged(left()) && replies_.wait_acknowledged(left());
+  return deltas_.wait_acknowledged(end) && tiles_.wait_acknowledged(end) &&
+         manifest_.wait_acknowledged(end) && replies_.wait_acknowledged(end);
 }
 
 std::uint64_t MapPublication::failures() const {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
@@ -47,10 +48,12 @@ class MapPublication {
   void answer_requests();
   /// What the map is, as far as its deltas have left; `final_version` at the end of a run.
   void send_manifest(std::size_t objects, bool final_version);
+  /// What of the requests could not be heard or read.
+  void count_problems(ProblemCounter& problems);
   /// Messages that are to be sent.
   std::size_t waiting() const;
   MapTraffic traffic() const;
-  bool wait_acknowledged(std::chrono::milliseconds time);
+  bool wait_acknowledged(std::chrono::steady_clock::time_point end);
 
   // Any thread:
 
@@ -74,6 +77,7 @@ class MapPublication {
     std::uint64_t version = 0;
     MapDigest digest;
     std::size_t tiles = 0;
+    StampNs stamp_ns = 0;
   };
 
   const NodeFile config_;

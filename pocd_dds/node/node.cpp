@@ -67,7 +67,8 @@ struct Node::Impl {
   void stop_drawing();
   void process(const Frame& frame);
   void publish(bool now);
-  void look_for_rivals(IntakeStatus& input);
+  /// What is wrong on the bus beside the robots' topics.
+  void add_problems(IntakeStatus& input);
   void send_status(const std::string& state);
   void send_outputs(bool last);
   void turn();
@@ -81,7 +82,7 @@ struct Node::Impl {
   FrameQueue queue;
   Wakeup wakeup;
 
-  // The drawing thread only, until it has ended.
+  // The drawing thread only, until it has ended; but for what is thread-safe.
   Wakeup outputs_wakeup;
   RosOutputs outputs;
   NodeClock clock;  // thread-safe
@@ -89,10 +90,12 @@ struct Node::Impl {
 
   // run()'s thread only.
   RivalWatch rivals;
+  ProblemCounter problems;
   Clock::time_point status_sent{};
   bool map_waits = false;
 
-  // Guards everything below that several threads use; the map has a lock of its own.
+  // Guards everything below that several threads use; the map has a lock of its own, because only
+  // its data is so large that encoding and writing it would hold up the others.
   mutable std::mutex mutex;
   FrameLog frames;
   ObjectPublication objects;
@@ -102,7 +105,7 @@ struct Node::Impl {
   double busy_ms = 0.0;
   std::uint64_t busy_frames = 0;
   std::exception_ptr failure;
-  std::atomic<bool> failed{false};
+  std::atomic<bool> failed{false}, worked{false};
 
   Intake intake;
   std::thread worker, drawer;
@@ -128,6 +131,8 @@ void Node::Impl::work() {
     publish(false);
   }
   publish(true);
+  worked = true;
+  wakeup.wake();
 }
 
 void Node::Impl::draw() {
@@ -190,7 +195,7 @@ void Node::Impl::publish(bool now) {
   counts.publishing_cpu_ms += thread_cpu_ms() - cpu_ms;
 }
 
-void Node::Impl::look_for_rivals(IntakeStatus& input) {
+void Node::Impl::add_problems(IntakeStatus& input) {
   for (const std::uint64_t epoch : rivals.take()) {
     spdlog::warn(
         "{}: epoch {:016x} publishes map {} as well: subscribers follow one of the two and say "
@@ -198,17 +203,23 @@ void Node::Impl::look_for_rivals(IntakeStatus& input) {
         "they are stale; give each node a node.map_id of its own",
         topics::kMapManifest.name, epoch, config.node.map_id);
   }
-  if (rivals.manifests_heard() == 0) return;
-  input.problems.push_back(
-      {topics::kMapManifest.name, "second_publisher", rivals.manifests_heard(), ""});
+  if (rivals.manifests_heard() > 0) {
+    input.problems.push_back(
+        {topics::kMapManifest.name, "second_publisher", rivals.manifests_heard(), ""});
+  }
+  if (outputs.grid_too_large()) {
+    input.problems.push_back({topics::kOccupancy.name, "grid_too_large", 1, ""});
+  }
+  rivals.count_problems(problems);
+  map.count_problems(problems);
+  clock.count_problems(problems);
+  const auto more = problems.entries();
+  input.problems.insert(input.problems.end(), more.begin(), more.end());
 }
 
 void Node::Impl::send_status(const std::string& state) {
   IntakeStatus input = intake.status();
-  look_for_rivals(input);
-  if (outputs.grid_too_large()) {
-    input.problems.push_back({topics::kOccupancy.name, "grid_too_large", 1, ""});
-  }
+  add_problems(input);
   const std::lock_guard<std::mutex> lock(mutex);
   counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
   busy_ms = 0.0;
@@ -238,11 +249,13 @@ void Node::Impl::send_outputs(bool last) {
 
 void Node::Impl::turn() {
   wakeup.wait_for(map_waits ? kMapTurn : kPoll);
+  const double cpu_ms = thread_cpu_ms();
   map.answer_requests();
   map.send_waiting();
   {
     const std::lock_guard<std::mutex> lock(mutex);
     if (map.deltas_written()) latency.written();
+    counts.publishing_cpu_ms += thread_cpu_ms() - cpu_ms;
   }
   map_waits = map.waiting() > 0;
   const auto now = Clock::now();
@@ -254,6 +267,8 @@ void Node::Impl::turn() {
 
 bool Node::Impl::finish() {
   intake.stop();
+  // What is queued may take seconds: subscribers go on to hear of it, and that the node is there.
+  while (!worked && !failed) turn();
   worker.join();
   stop_drawing();
   if (failure) std::rethrow_exception(failure);
@@ -271,13 +286,9 @@ bool Node::Impl::finish() {
   send_outputs(true);
   const std::lock_guard<std::mutex> lock(mutex);
   // A late subscriber that asked for a snapshot just now still gets it.
-  const auto left = [&] {
-    const auto time = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
-    return std::max(time, std::chrono::milliseconds(0));
-  };
-  const bool acknowledged = map.waiting() == 0 && objects.wait_acknowledged(left()) &&
-                            map.wait_acknowledged(left()) && frames.wait_acknowledged(left()) &&
-                            status.wait_acknowledged(left()) && outputs.wait_acknowledged(left());
+  const bool acknowledged = map.waiting() == 0 && objects.wait_acknowledged(end) &&
+                            map.wait_acknowledged(end) && frames.wait_acknowledged(end) &&
+                            status.wait_acknowledged(end) && outputs.wait_acknowledged(end);
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
   return acknowledged && counts.write_failures == 0;
 }

@@ -7,6 +7,7 @@
 
 #include "pocd/common/types.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "rosgraph_msgsPubSubTypes.h"
 
@@ -35,6 +36,13 @@ class NodeClock {
       if (meta.valid) heard_ns_ = to_stamp(message.clock());
     });
     return heard_ns_;
+  }
+  /// What of the replay's clock could not be heard or read.
+  void count_problems(ProblemCounter& problems) {
+    if (!reader_) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    problems.count_incompatible(*reader_);
+    problems.count_damaged(*reader_);
   }
 
  private:

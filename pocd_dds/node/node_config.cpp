@@ -112,9 +112,14 @@ void NodeConfig::set_robots(const std::vector<std::string>& names) {
     robot.name = name;
     chosen.push_back(robot);
   }
-  robots = std::move(chosen);
-  const std::vector<std::string> problems = inconsistencies();
-  if (!problems.empty()) throw InputError("--robot: " + problems.front());
+  NodeConfig changed = *this;
+  changed.robots = std::move(chosen);
+  std::string text;
+  for (const std::string& problem : changed.inconsistencies()) {
+    text += (text.empty() ? "node: " : "\nnode: ") + problem;
+  }
+  if (!text.empty()) throw InputError(text);
+  robots = std::move(changed.robots);
 }
 
 }  // namespace pocd::dds

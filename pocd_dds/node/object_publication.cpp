@@ -58,8 +58,8 @@ void ObjectPublication::send_due(bool now) {
   }
 }
 
-bool ObjectPublication::wait_acknowledged(std::chrono::milliseconds time) {
-  return states_.wait_acknowledged(time) && events_.wait_acknowledged(time);
+bool ObjectPublication::wait_acknowledged(std::chrono::steady_clock::time_point end) {
+  return states_.wait_acknowledged(end) && events_.wait_acknowledged(end);
 }
 
 }  // namespace pocd::dds

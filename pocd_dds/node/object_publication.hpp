@@ -23,7 +23,7 @@ class ObjectPublication {
   void add(const FrameResult& result, StampNs stamp_ns);
   /// Sends states that are due, or all that are left with `now`.
   void send_due(bool now);
-  bool wait_acknowledged(std::chrono::milliseconds time);
+  bool wait_acknowledged(std::chrono::steady_clock::time_point end);
 
   const std::map<ObjectId, ObjectSnapshot>& objects() const { return objects_; }
   /// Objects that are new, have changed or have gone; for the reader to empty.

@@ -5,6 +5,7 @@
 #include <set>
 #include <vector>
 
+#include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_msgsPubSubTypes.h"
@@ -34,6 +35,11 @@ class RivalWatch {
     return fresh;
   }
   std::uint64_t manifests_heard() const { return manifests_heard_; }
+  /// What of the manifests could not be heard or read.
+  void count_problems(ProblemCounter& problems) {
+    problems.count_incompatible(manifests_);
+    problems.count_damaged(manifests_);
+  }
 
  private:
   static constexpr std::size_t kMostKnown = 100;

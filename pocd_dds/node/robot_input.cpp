@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string_view>
 #include <utility>
 
 #include "pocd/common/check.hpp"
@@ -10,10 +11,14 @@
 namespace pocd::dds {
 namespace {
 
-// Taken in one turn, so that a topic which never stops coming does not hold up the others.
-constexpr int kMostImages = 16, kMostMessages = 1000;
+// Taken in one turn, so that a topic which never stops coming does not hold up the others. More
+// messages than their readers keep.
+constexpr std::size_t kMostImages = 16;
+constexpr int kMostMessages = 1000;
 // Depth images that wait for something; the synchroniser would drop beyond twice as many.
 constexpr std::size_t kHoldDepth = 32;
+
+constexpr std::string_view kArrow = " -> ";  // between the two frames of a transform
 
 double seconds(RobotInput::Clock::duration time) {
   return std::chrono::duration<double>(time).count();
@@ -61,6 +66,7 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
                        LatencyLog& latency)
     : robot_(robot),
       map_frame_(node.map_frame),
+      tf_topic_(robot_topic(node.topics.tf, robot.name)),
       lossless_(node.lossless),
       silent_wait_s_(node.silent_wait_s),
       camera_frame_(robot.camera_frame),
@@ -103,18 +109,22 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
   }
 }
 
-void RobotInput::drain(bool hold) {
-  // Looked at before the taking: what a source that has gone had sent is with the readers by then.
+void RobotInput::look(Turn turn) {
+  turn_ = turn;
   const bool live_before = live();
   if (live_before && !had_source_) heard(Stream::kDepth);  // silence begins now
   had_source_ = had_source_ || live_before;
-  source_left_ = had_source_ && !live_before && !hold;
+  source_left_ = had_source_ && !live_before && turn != Turn::kHold;
+}
+
+void RobotInput::drain(const std::set<std::string>& shared_moved) {
+  hear_transforms(shared_moved);
   drain_poses();
   drain_camera_info();
   for (ImageReader* reader : {depth_.get(), segmentation_.get(), color_.get()}) {
     if (reader != nullptr) problems_.count_incompatible(*reader);
   }
-  if (hold) return;
+  if (turn_ == Turn::kHold) return;
   if (segmentation_) drain_images(Stream::kSegmentation, *segmentation_);
   if (color_) drain_images(Stream::kColor, *color_);
   drain_images(Stream::kDepth, *depth_);
@@ -142,12 +152,12 @@ void RobotInput::drain_camera_info() {
     }
     camera_ = camera.value;
   });
-  count_damaged(camera_info_);
+  problems_.count_damaged(camera_info_);
 }
 
 void RobotInput::drain_poses() {
   problems_.count_incompatible(odometry_);
-  if (tf_ && tf_->drain(transforms_, problems_)) heard(Stream::kPose);
+  if (tf_) hear_transforms(tf_->drain(transforms_, problems_));
   odometry_.take_some(kMostMessages, [&](const auto& message, const SampleMeta& meta) {
     if (!meta.valid) return;
     const Checked<StampedTransform> pose = transform_from(message);
@@ -161,12 +171,17 @@ void RobotInput::drain_poses() {
     if (problem) problems_.count(odometry_.topic(), *problem);
     synchronizer_.pose_seen(T.stamp_ns, problem);
   });
-  count_damaged(odometry_);
+  problems_.count_damaged(odometry_);
 }
 
-void RobotInput::count_damaged(RawReader& reader) {
-  problems_.count(reader.topic(), "damaged", "a message that cannot be read",
-                  reader.take_damaged());
+// Others send transforms, too: what counts is the one that the oldest frame waits for.
+void RobotInput::hear_transforms(const std::set<std::string>& moved) {
+  if (synchronizer_.blocked_by() != Stream::kPose) return;
+  const std::string& edge = synchronizer_.blocking_edge();
+  const std::size_t arrow = edge.find(kArrow);
+  if (arrow != std::string::npos && moved.count(edge.substr(arrow + kArrow.size())) > 0) {
+    heard(Stream::kPose);
+  }
 }
 
 void RobotInput::drain_images(Stream stream, ImageReader& reader) {
@@ -174,14 +189,17 @@ void RobotInput::drain_images(Stream stream, ImageReader& reader) {
   ImageVisit visit{
       [&](const recording::RosImage& message) { converted = convert(stream, message); }};
   SampleMeta meta;
-  // Of a source that has gone there is no more than the reader holds, and all of it is wanted.
-  for (int i = 0; i < kMostImages || source_left_; ++i) {
+  // At the end all that the reader holds now is wanted, but not what a writer that is still there
+  // goes on to send.
+  const std::size_t most = ending() ? std::max(kMostImages, reader.unread()) : kMostImages;
+  for (std::size_t i = 0; i < most; ++i) {
     const bool enough = stream == Stream::kDepth && synchronizer_.pending() >= kHoldDepth;
-    if (lossless_ && enough && !source_left_) return;
+    if (lossless_ && enough && !ending()) return;
     const double before_ms = thread_cpu_ms();
     const bool taken = reader.take(visit, meta);
     take_cpu_ms_ += thread_cpu_ms() - before_ms;
-    count_damaged(reader);
+    visit.rethrow();
+    problems_.count_damaged(reader);
     if (!taken) return;
     if (!meta.valid) continue;
     heard(stream);
@@ -267,7 +285,7 @@ void RobotInput::judge_silence() {
                   {InputReason::kSilentStream,
                    "nothing came for " + whole_seconds(silent_wait_s_) + " while " +
                        std::to_string(synchronizer_.pending()) + " depth images of " + name() +
-                       " waited for it: not waited for until it comes"});
+                       " were " + synchronizer_.waiting_for() + ": not waited for until it comes"});
 }
 
 std::string RobotInput::topic_of(Stream stream) const {
@@ -280,8 +298,8 @@ std::string RobotInput::topic_of(Stream stream) const {
       return color_ ? color_->topic() : "";
     case Stream::kCameraInfo:
       return camera_info_.topic();
-    case Stream::kPose:
-      return odometry_.topic();
+    case Stream::kPose:  // a robot may say it on either
+      return odometry_.topic() + " or " + tf_topic_;
   }
   return "";
 }
@@ -313,13 +331,12 @@ void RobotInput::set_patience() {
   of_images(Stream::kColor, color_.get(), color_required_);
 }
 
-std::vector<Frame> RobotInput::take(bool last_call) {
+std::vector<Frame> RobotInput::take() {
   judge_silence();
   set_patience();
 
   std::vector<Frame> frames;
-  const std::vector<SyncedFrame> ready =
-      last_call || source_left_ ? synchronizer_.flush() : synchronizer_.take();
+  const std::vector<SyncedFrame> ready = ending() ? synchronizer_.flush() : synchronizer_.take();
   if (!ready.empty()) {
     moved_on_ = Clock::now();
     // Every frame has a pose and intrinsics.

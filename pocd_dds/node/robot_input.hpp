@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -35,12 +36,21 @@ class RobotInput {
 
   const std::string& name() const { return robot_.name; }
 
-  /// Takes what has arrived. `hold`: leaves images with their readers, to hold the sender back.
-  void drain(bool hold);
+  enum class Turn {
+    kUsual,
+    kHold,  ///< images stay with their readers, to hold the sender back
+    kLast   ///< all that has arrived is taken, and nothing is waited for
+  };
+  // A turn is these three, one after the other.
 
-  /// Frames that are ready, by stamp. Once the source of the images has gone, or with `last_call`,
-  /// nothing is waited for any more.
-  std::vector<Frame> take(bool last_call);
+  /// Looks whether the source of the images is there. To be called before anything is taken, here
+  /// or from the shared transforms: what a source that has gone had sent is with the readers then.
+  void look(Turn turn);
+  /// Takes what has arrived. `shared_moved` are the frames that moved in the shared transforms.
+  void drain(const std::set<std::string>& shared_moved);
+  /// Frames that are ready, by stamp. Once the source of the images has gone, nothing is waited for
+  /// any more.
+  std::vector<Frame> take();
 
   /// After take(): once when the source of depth images has gone and nothing of it is left, the
   /// robot's frames from the camera up to the map, as far as they are known. The next source may
@@ -73,9 +83,11 @@ class RobotInput {
   using ImageReader = Reader<ImageVisitType>;
   using Stream = TimeSynchronizer::Stream;
 
+  /// Nothing comes after this turn: all that the readers hold is taken, and all frames come out.
+  bool ending() const { return turn_ == Turn::kLast || source_left_; }
   void drain_poses();
   void drain_camera_info();
-  void count_damaged(RawReader& reader);
+  void hear_transforms(const std::set<std::string>& moved);
   void drain_images(Stream stream, ImageReader& reader);
   /// An image of a stream as the synchroniser takes it, or what is wrong with it.
   struct ConvertedImage {
@@ -94,7 +106,7 @@ class RobotInput {
   std::string topic_of(Stream stream) const;
 
   RobotConfig robot_;
-  const std::string map_frame_;
+  const std::string map_frame_, tf_topic_;
   const bool lossless_;
   const double silent_wait_s_;
   std::string camera_frame_;           ///< "" until the first depth image
@@ -106,6 +118,7 @@ class RobotInput {
   TransformTree transforms_;
   TimeSynchronizer synchronizer_;
   PoseQuaternion mount_;
+  Turn turn_ = Turn::kUsual;
   bool had_source_ = false, source_left_ = false;
   std::uint64_t frames_ = 0, images_ = 0;
   std::uint64_t refused_ = 0;

@@ -106,6 +106,9 @@ void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
     objects.keys.clear();
   }
   if (occupancy_due_ || surface_due_) copy_tiles(tiles);
+  // What no output needs must not grow for ever.
+  if (!markers_ && !obstacles_ && !surface_) objects.keys.clear();
+  if (!grid_ && !surface_) tiles.keys.clear();
 }
 
 void RosOutputs::send() {
@@ -116,9 +119,9 @@ void RosOutputs::send() {
   markers_due_ = obstacles_due_ = occupancy_due_ = surface_due_ = false;
 }
 
-bool RosOutputs::wait_acknowledged(std::chrono::milliseconds time) {
-  const auto acknowledged = [time](const auto& writer) {
-    return !writer || writer->wait_acknowledged(time);
+bool RosOutputs::wait_acknowledged(std::chrono::steady_clock::time_point end) {
+  const auto acknowledged = [end](const auto& writer) {
+    return !writer || writer->wait_acknowledged(end);
   };
   return acknowledged(markers_) && acknowledged(grid_) && acknowledged(grid_updates_) &&
          acknowledged(surface_);
@@ -130,10 +133,9 @@ std::uint64_t RosOutputs::failures() const {
 }
 
 void RosOutputs::send_markers() {
-  auto message = marker_array(objects_, marker_departures_.update(objects_), first_markers_,
+  auto message = marker_array(objects_, marker_departures_.update(objects_), all_markers_anew_,
                               stamp_ns_, config_.node.map_frame);
-  first_markers_ = false;
-  markers_->write(message);
+  all_markers_anew_ = !markers_->write(message);  // with one that is refused, deletions are, too
 }
 
 void RosOutputs::send_obstacles() {
@@ -163,13 +165,14 @@ void RosOutputs::send_occupancy() {
   const int readers = grid_->ever_matched() + grid_updates_->ever_matched();
   const auto& rectangle = projection_.changed_rectangle();
   if (rectangle) grid_outdated_ = true;
-  if (resized || (grid_outdated_ && (readers != grid_readers_ || last_))) {
+  // One that is refused is made good by a whole one at the next period.
+  if (resized || grid_unsent_ || (grid_outdated_ && (readers != grid_readers_ || last_))) {
     auto message = grid_message(projection_.grid(), config_.pipeline.map.voxel_size_m, stamp_ns_,
                                 config_.node.map_frame);
-    grid_outdated_ = !grid_->write(message);
+    grid_outdated_ = grid_unsent_ = !grid_->write(message);
   } else if (rectangle) {
     auto message = grid_update_message(*rectangle, stamp_ns_, config_.node.map_frame);
-    if (!grid_updates_->write(message)) grid_outdated_ = true;
+    grid_unsent_ = !grid_updates_->write(message);
   }
   grid_readers_ = readers;
 }

@@ -39,7 +39,8 @@ class RosOutputs {
                const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns, bool last);
   void send();
   /// Of the topics that keep their last state.
-  bool wait_acknowledged(std::chrono::milliseconds time);
+  bool wait_acknowledged(std::chrono::steady_clock::time_point end);
+  /// Thread-safe.
   std::uint64_t failures() const;
   /// The grid is not published: tiles are too far apart. Thread-safe.
   bool grid_too_large() const { return grid_too_large_; }
@@ -71,12 +72,13 @@ class RosOutputs {
   // removed.
   std::map<TileKey, bool> grid_steps_, surface_steps_;
 
-  bool first_markers_ = true;
+  bool all_markers_anew_ = true;
   Departures marker_departures_, obstacle_departures_;
   OccupancyProjection projection_;
   std::atomic<bool> grid_too_large_{false};
-  int grid_readers_ = 0;  // ever matched when the last whole grid was sent
-  bool grid_outdated_ = false;
+  int grid_readers_ = 0;        // ever matched when the last whole grid was sent
+  bool grid_outdated_ = false;  // updates have been sent since the last whole one
+  bool grid_unsent_ = false;    // the last message was refused
   SurfacePoints points_;
   bool surface_unsent_ = false;
 };

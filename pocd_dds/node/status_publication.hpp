@@ -55,7 +55,9 @@ class StatusPublication {
   void send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
             std::uint64_t queue_dropped, const std::string& state, StampNs now_ns);
   /// Health only: it says how the node ended.
-  bool wait_acknowledged(std::chrono::milliseconds time) { return health_.wait_acknowledged(time); }
+  bool wait_acknowledged(std::chrono::steady_clock::time_point end) {
+    return health_.wait_acknowledged(end);
+  }
 
  private:
   std::string name_;

@@ -7,7 +7,6 @@ namespace pocd::dds {
 namespace {
 
 constexpr int kMostMessages = 1000;  // taken in one turn
-constexpr const char* kDamaged = "a message that cannot be read";
 
 }  // namespace
 
@@ -18,14 +17,14 @@ TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
       static_(participant, topics::kTfStatic, tf_static_topic, topics::kTfStatic.delivery, wakeup) {
 }
 
-bool TransformInput::drain(TransformTree& tree, ProblemCounter& problems) {
+std::set<std::string> TransformInput::drain(TransformTree& tree, ProblemCounter& problems) {
   drain(static_, true, tree, problems);
   return drain(moving_, false, tree, problems);
 }
 
-bool TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree,
-                           ProblemCounter& problems) {
-  bool any = false;
+std::set<std::string> TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree,
+                                            ProblemCounter& problems) {
+  std::set<std::string> moved;
   problems.count_incompatible(reader);
   reader.take_some(kMostMessages, [&](const auto& message, const SampleMeta& meta) {
     if (!meta.valid) return;
@@ -35,15 +34,15 @@ bool TransformInput::drain(TfReader& reader, bool is_static, TransformTree& tree
         problems.count(reader.topic(), *transform.problem);
         continue;
       }
-      any = true;
       const auto& [parent, child, stamp_ns, T] = *transform.value;
+      if (!is_static) moved.insert(child);
       const std::optional<InputProblem> problem =
           is_static ? tree.set_static(parent, child, T) : tree.add(parent, child, stamp_ns, T);
       if (problem) problems.count(reader.topic(), *problem);
     }
   });
-  problems.count(reader.topic(), "damaged", kDamaged, reader.take_damaged());
-  return any;
+  problems.count_damaged(reader);
+  return moved;
 }
 
 }  // namespace pocd::dds

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 
 #include "pocd/input/transform_tree.hpp"
@@ -18,13 +19,13 @@ class TransformInput {
   TransformInput(const std::shared_ptr<Participant>& participant, const std::string& tf_topic,
                  const std::string& tf_static_topic, bool lossless, Wakeup& wakeup);
 
-  /// Puts what has arrived into the tree. True when there was anything that moves.
-  bool drain(TransformTree& tree, ProblemCounter& problems);
+  /// Puts what has arrived into the tree. The child frames of what moves.
+  std::set<std::string> drain(TransformTree& tree, ProblemCounter& problems);
 
  private:
   using TfReader = Reader<tf2_msgs::msg::TFMessagePubSubType>;
-  static bool drain(TfReader& reader, bool is_static, TransformTree& tree,
-                    ProblemCounter& problems);
+  static std::set<std::string> drain(TfReader& reader, bool is_static, TransformTree& tree,
+                                     ProblemCounter& problems);
 
   TfReader moving_, static_;
 };

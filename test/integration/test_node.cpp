@@ -47,6 +47,15 @@ TEST(Node, UsageErrorsNameWhatIsWrongAndExitCodeIs2) {
   }
 }
 
+TEST(Node, AllThatIsWrongWithNamedRobotsIsSaid) {
+  const CommandResult result = run_command({bin("pocd_node"), "--robot", "r 1", "--robot", "r 1"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("node: robots: the name \"r 1\" has a blank in it"), std::string::npos)
+      << result.err;
+  EXPECT_NE(result.err.find("node: robots: the name r 1 is used twice"), std::string::npos)
+      << result.err;
+}
+
 TEST(Node, ARobotOfTheCommandLineKeepsItsEntryInTheFile) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "robots.yaml";
@@ -193,6 +202,80 @@ TEST(Node, OptionalStreamThatStaysSilentDoesNotHoldALosslessRun) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_NE(result.err.find("60 frames processed"), std::string::npos) << result.err;
   }
+}
+
+// Its synchroniser and its reader are full of images that wait for labels. What was acknowledged is
+// used or counted.
+TEST(Node, TheEndOfALosslessRunTakesAllThatHasArrived) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  RobotSender sender(bus, "robot1", true);
+  Process node(node_command(domain, {"--lossless", "--set", "node.segmentation=required", "--set",
+                                     "node.silent_wait_s=3600"}));
+  ASSERT_TRUE(eventually([&] { return health.newest() != nullptr && sender.matched(); }));
+  constexpr int kHeld = 32 + 8;
+  for (int i = 1; i <= kHeld; ++i) {
+    const StampNs stamp_ns = i * StampNs{33'000'000};
+    sender.send_odometry({"map", sender.camera_frame(), stamp_ns, {}});
+    sender.send_image(stamp_ns);
+  }
+  ASSERT_TRUE(sender.depth.wait_acknowledged(kGenerous));
+  ASSERT_TRUE(sender.odometry.wait_acknowledged(kGenerous));
+  ASSERT_TRUE(sender.info.wait_acknowledged(kGenerous));
+  node.signal(SIGTERM);
+  ASSERT_TRUE(eventually([&] { return health.newest()->message() == "stopped"; }));
+  ASSERT_EQ(health.newest()->robots().size(), 1u);
+  EXPECT_EQ(health.newest()->robots()[0].dropped(), static_cast<std::uint64_t>(kHeld));
+  EXPECT_EQ(node.wait().exit_code, 0);
+}
+
+// What is queued at the end may take long: the node stays heard, and its map goes on.
+TEST(Node, IsHeardWhileItEmptiesItsQueue) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Wakeup wakeup;
+  dds::Reader<pocd_msgs::msg::NodeHealthPubSubType> reader(bus, dds::topics::kHealth, wakeup);
+  RobotSender sender(bus, "robot1");
+  Process node(
+      node_command(domain, {"--lossless", "--set", "node.queue_frames=1000", "--set",
+                            "node.segmentation=absent", "--set", "map.voxel_size_m=0.01"}));
+  ASSERT_TRUE(eventually([&] { return sender.matched(); }));
+  std::vector<pocd_msgs::msg::NodeHealth> heard;
+  const auto hear = [&] {
+    pocd_msgs::msg::NodeHealth health;
+    dds::SampleMeta meta;
+    const std::size_t before = heard.size();
+    while (reader.take(health, meta)) {
+      if (meta.valid) heard.push_back(health);
+    }
+    return heard.size() > before;
+  };
+  StampNs stamp_ns = 0;
+  const auto send = [&] {
+    stamp_ns += 33'000'000;
+    sender.send_odometry({"map", "camera", stamp_ns, {}});
+    auto info = dds::camera_message({640, 480, 400, 400, 320, 240}, stamp_ns, "camera");
+    EXPECT_TRUE(sender.info.write(info));
+    auto depth = dds::image_message(cv::Mat(480, 640, CV_16UC1, cv::Scalar(1500)), "16UC1",
+                                    stamp_ns, "camera");
+    EXPECT_TRUE(sender.depth.write(depth));
+    EXPECT_TRUE(sender.depth.wait_acknowledged(kGenerous));
+  };
+  ASSERT_TRUE(eventually([&] {  // work for four seconds
+    if (!hear()) return false;
+    const auto& now = heard.back();
+    if (now.queue_length() * now.processing_ms() > 4000.0) return true;
+    for (int i = 0; i < 60; ++i) send();
+    return false;
+  }));
+  const std::size_t before = heard.size();
+  node.signal(SIGTERM);
+  EXPECT_TRUE(eventually([&] { return hear() && heard.back().message() == "stopped"; }));
+  EXPECT_EQ(node.wait().exit_code, 0);
+  // One may have been on its way when the signal came.
+  ASSERT_GE(heard.size(), before + 3) << "only its last word";
+  EXPECT_EQ(heard[before + 1].message(), "running");
 }
 
 TEST(Node, OperatorsProfileReplacesTheTable) {

@@ -1,7 +1,9 @@
 // A fleet manager's view of one lane: what comes to stand on it, what was seen to leave it, and
 // when nobody knows. Free is a lane with nothing on it, nothing unknown, and a component that
-// looks. usage: lane_watch DOMAIN WIDTH X1 Y1 X2 Y2 [X3 Y3 ...]   metres of the map frame; runs
-// until killed
+// looks.
+//
+// Nobody tells of a thing that was carried away while the component was down: its place stays
+// unknown until a person has looked and starts this program anew.
 #include <unistd.h>
 
 #include <algorithm>
@@ -32,7 +34,13 @@ int main(int argc, char** argv) {
   Lane lane;
   for (int i = 2; i < argc; ++i)
     (i == 2 ? lane.width_m : lane.xy.emplace_back()) = std::atof(argv[i]);
-  if (lane.xy.size() < 4 || lane.xy.size() % 2 != 0) return 2;
+  if (lane.xy.size() < 4 || lane.xy.size() % 2 != 0) {
+    std::fputs(
+        "usage: lane_watch DOMAIN WIDTH X1 Y1 X2 Y2 [X3 Y3 ...]\n"
+        "metres of the map frame; runs until killed\n",
+        stderr);
+    return 2;
+  }
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
 
   // By uuid. Unknown: seen on the lane before the component restarted, and not seen since.

@@ -107,6 +107,8 @@ class TimeSynchronizer {
   std::optional<StampNs> newest_ns(Stream stream) const;
   /// The stream that the oldest frame waits for; nothing when there is none or it waits for none.
   std::optional<Stream> blocked_by() const { return blocked_by_; }
+  /// When that is the pose: the transform that is not there yet, "parent -> child".
+  const std::string& blocking_edge() const { return blocking_edge_; }
   /// Why a frame that was waited for was dropped without pose, the last time since the call before.
   std::optional<InputProblem> take_pose_problem() {
     return std::exchange(pose_problem_, std::nullopt);
