@@ -13,12 +13,15 @@ namespace {
 /// Objects with their disposes, as a fleet manager takes them.
 class ObjectLog {
  public:
-  explicit ObjectLog(const TestDomain& domain)
-      : states_(test_participant(domain), dds::topics::kObjects, taker_.wakeup()) {
+  explicit ObjectLog(const TestDomain& domain) : ObjectLog(test_participant(domain)) {}
+  explicit ObjectLog(const std::shared_ptr<dds::Participant>& bus)
+      : states_(bus, dds::topics::kObjects, taker_.wakeup()), behind_(bus) {
     taker_.start([this] { take(); });
   }
   void stop() { taker_.stop(); }
-  bool matched() const { return states_.matched() > 0; }
+  /// From here on every state is heard: a node whose health has come in by a reader that was made
+  /// later has found this one, too.
+  bool matched() { return states_.matched() > 0 && behind_.newest() != nullptr; }
 
   // To be looked at after stop().
   std::map<std::array<std::uint8_t, 16>, pocd_msgs::msg::ObjectState> present;
@@ -42,6 +45,7 @@ class ObjectLog {
 
   Taker taker_;
   dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> states_;
+  HealthWatch behind_;  // made after the reader
 };
 
 TEST(Chain, LiveEqualsOfflineAndRemovalIsDisposed) {
