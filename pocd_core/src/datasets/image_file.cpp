@@ -53,8 +53,8 @@ long number_at(const Bytes& bytes, std::size_t at, int count, bool big_endian) {
   return value;
 }
 
-/// Width and height as the header says them; 0 x 0 for an unknown format or a damaged header. A few
-/// kilobytes can hold an image of gigabytes.
+/// Width and height as the header says them; neither is positive for an unknown format or a damaged
+/// header. A few kilobytes can hold an image of gigabytes.
 std::pair<long, long> announced_size(const Bytes& bytes) {
   const auto begins_with = [&](std::initializer_list<unsigned char> start) {
     return bytes.size() >= start.size() && std::equal(start.begin(), start.end(), bytes.begin());
@@ -84,15 +84,14 @@ std::pair<long, long> announced_size(const Bytes& bytes) {
 }
 
 void check_size(const Bytes& bytes, cv::Size expected, const fs::path& file) {
-  constexpr long kLargestSide = 16384;
   const auto [width, height] = announced_size(bytes);
   const std::string text = std::to_string(width) + "x" + std::to_string(height);
   if (width < 1 || height < 1) {
-    throw InputError(file.string() + ": is no image that can be decoded");
+    throw InputError(file.string() + ": is no PNG, JPEG or OpenEXR image that can be decoded");
   }
-  if (width > kLargestSide || height > kLargestSide) {
+  if (width > kLargestSide_px || height > kLargestSide_px) {
     throw InputError(file.string() + ": image is " + text + ", more than " +
-                     std::to_string(kLargestSide) + " a side");
+                     std::to_string(kLargestSide_px) + " a side");
   }
   if (expected.width > 0 && (width != expected.width || height != expected.height)) {
     throw InputError(file.string() + ": image is " + text + ", camera is " +

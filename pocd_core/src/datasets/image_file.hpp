@@ -24,7 +24,7 @@ cv::Mat read_label_image(const std::filesystem::path& file, cv::Size size);
 cv::Mat read_metre_image(const std::filesystem::path& file, cv::Size size);
 /// Ids of 8 or 16 bits, as one channel or as grey in three.
 cv::Mat read_id_image(const std::filesystem::path& file, cv::Size size);
-/// Any picture, as 8-bit BGR.
+/// As 8-bit BGR.
 cv::Mat read_color_image(const std::filesystem::path& file, cv::Size size);
 
 /// Regular files of a folder whose name is prefix + digits + suffix, by the number; empty when the

@@ -9,36 +9,45 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "pocd/common/check.hpp"
+#include "pocd/input/camera_model.hpp"
 
 namespace pocd {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kLargestSide = 16384;
-
 /// What a header says of the size of its points.
 struct Layout {
   std::uint64_t width = 0, height = 0, points = 0, point_bytes = 0;
 };
 
-/// The whole numbers after the first word of a line; empty when one of them is none.
-std::vector<std::uint64_t> numbers_of(const std::string& line) {
+/// The words of a line, which blanks or tabs part.
+std::vector<std::string> words_of(const std::string& line) {
   std::istringstream in(line);
-  std::string word;
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
+/// The words after the first one, all of which must be whole numbers.
+std::vector<std::uint64_t> numbers_of(const std::vector<std::string>& words, const fs::path& file) {
   std::vector<std::uint64_t> numbers;
-  for (in >> word; in >> word;) {
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    const std::string& word = words[i];
     std::uint64_t number = 0;
     const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-    if (error != std::errc() || stop != word.data() + word.size() || number > 0xFFFFFFFFu)
-      return {};
+    if (error != std::errc() || stop != word.data() + word.size() || number > 0xFFFFFFFFu) {
+      throw InputError(file.string() + ": " + words[0] + " is \"" + word +
+                       "\", expected a whole number");
+    }
     numbers.push_back(number);
   }
+  if (numbers.empty()) throw InputError(file.string() + ": " + words[0] + " has no value");
   return numbers;
 }
 
@@ -48,22 +57,25 @@ std::vector<std::uint64_t> numbers_of(const std::string& line) {
 void require_whole(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file.string() + ": cannot be read");
-  std::string line;
-  Layout layout;
-  std::vector<std::uint64_t> sizes, counts;
-  bool found = false;
-  for (int i = 0; i < 64 && !found && std::getline(in, line); ++i) {
-    const std::string key = line.substr(0, line.find(' '));
-    const std::vector<std::uint64_t> numbers = numbers_of(line);
-    const std::uint64_t first = numbers.empty() ? 0 : numbers[0];
-    if (key == "SIZE") sizes = numbers;
-    if (key == "COUNT") counts = numbers;
-    if (key == "WIDTH") layout.width = first;
-    if (key == "HEIGHT") layout.height = first;
-    if (key == "POINTS") layout.points = first;
-    found = key == "DATA";
+  std::string line, data;
+  std::map<std::string, std::vector<std::uint64_t>> header{
+      {"SIZE", {}}, {"COUNT", {}}, {"WIDTH", {}}, {"HEIGHT", {}}, {"POINTS", {}}};
+  for (int i = 0; i < 64 && data.empty() && std::getline(in, line); ++i) {
+    const std::vector<std::string> words = words_of(line);
+    if (words.empty()) continue;
+    if (const auto entry = header.find(words[0]); entry != header.end())
+      entry->second = numbers_of(words, file);
+    if (words[0] == "DATA") data = words.size() > 1 ? words[1] : "?";
   }
-  if (!found) throw InputError(file.string() + ": has no PCD header");
+  if (data.empty()) throw InputError(file.string() + ": has no PCD header");
+  for (const char* key : {"SIZE", "WIDTH", "HEIGHT", "POINTS"}) {
+    if (header.at(key).empty()) throw InputError(file.string() + ": header has no " + key);
+  }
+  const std::vector<std::uint64_t>&sizes = header.at("SIZE"), &counts = header.at("COUNT");
+  Layout layout;
+  layout.width = header.at("WIDTH")[0];
+  layout.height = header.at("HEIGHT")[0];
+  layout.points = header.at("POINTS")[0];
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const std::uint64_t count = i < counts.size() ? counts[i] : 1;
     if (sizes[i] > 8 || count > 64) {
@@ -72,24 +84,25 @@ void require_whole(const fs::path& file) {
     }
     layout.point_bytes += sizes[i] * count;
   }
-  if (layout.width > kLargestSide || layout.height > kLargestSide ||
-      (layout.points != 0 && layout.points != layout.width * layout.height)) {
+  if (layout.width > kLargestSide_px || layout.height > kLargestSide_px ||
+      layout.points != layout.width * layout.height) {
     throw InputError(file.string() + ": is " + std::to_string(layout.width) + "x" +
                      std::to_string(layout.height) + " with " + std::to_string(layout.points) +
                      " points");
   }
   std::error_code error;
   const std::uint64_t file_bytes = fs::file_size(file, error);
+  in.clear();  // the header may end the file
   const std::uint64_t begin = static_cast<std::uint64_t>(in.tellg());
   const std::uint64_t points = layout.width * layout.height;
   std::uint64_t needed = points * layout.point_bytes;
-  if (line.compare(0, 22, "DATA binary_compressed") == 0) {
+  if (data == "binary_compressed") {
     std::uint32_t compressed[2] = {0, 0};
     in.read(reinterpret_cast<char*>(compressed), sizeof compressed);
     // LZF makes at most 264 bytes of 3.
     needed = in ? std::max<std::uint64_t>(sizeof compressed + compressed[0], needed / 88)
                 : file_bytes + 1;
-  } else if (line.compare(0, 11, "DATA binary") != 0) {
+  } else if (data != "binary") {
     needed = points * 2 * std::max<std::size_t>(sizes.size(), 1);  // a digit and a separator
   }
   if (error || file_bytes + 1 < begin + needed) {  // the last separator may be missing

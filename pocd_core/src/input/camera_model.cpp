@@ -29,8 +29,9 @@ std::string camera_fault(const CameraModel& camera) {
   const Axis axes[] = {{"width", "fx", "cx", camera.width, camera.fx, camera.cx},
                        {"height", "fy", "cy", camera.height, camera.fy, camera.cy}};
   for (const Axis& axis : axes) {
-    if (axis.size < 1 || axis.size > 16384) {
-      return fault(axis.size_name, axis.size, "not in [1, 16384]");
+    if (axis.size < 1 || axis.size > kLargestSide_px) {
+      return fault(axis.size_name, axis.size,
+                   "not in [1, " + std::to_string(kLargestSide_px) + "]");
     }
   }
   for (const Axis& axis : axes) {

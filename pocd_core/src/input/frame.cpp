@@ -9,7 +9,7 @@
 namespace pocd {
 namespace {
 
-constexpr double kFarthest_m = 1e6;
+constexpr double kFarthest_m = 5e4;
 
 std::string size_text(const cv::Mat& image) {
   return std::to_string(image.cols) + "x" + std::to_string(image.rows);

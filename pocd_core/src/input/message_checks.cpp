@@ -10,7 +10,6 @@
 namespace pocd {
 namespace {
 
-constexpr std::uint32_t kLargestSide = 16384;
 // Quaternions are sent as doubles, sometimes computed as floats; more than this is no rounding.
 constexpr double kUnitTolerance = 1e-3;
 // Of a field that is text from the bus, in a message about it.
@@ -29,7 +28,7 @@ std::optional<InputProblem> layout_problem(const ImageView& image, int type) {
   if (image.width == 0 || image.height == 0) {
     return InputProblem{InputReason::kEmptyImage, "image is " + text(image)};
   }
-  if (image.width > kLargestSide || image.height > kLargestSide) {
+  if (image.width > kLargestSide_px || image.height > kLargestSide_px) {
     return InputProblem{InputReason::kTooLarge, "image is " + text(image)};
   }
   if (image.is_bigendian && CV_ELEM_SIZE1(type) != 1) {
@@ -158,7 +157,7 @@ Checked<LabelImage> label_image(const ImageView& image, const ColourTable& colou
 
 Checked<CameraModel> camera_model(std::uint32_t width, std::uint32_t height,
                                   const std::array<double, 9>& k) {
-  if (width == 0 || height == 0 || width > kLargestSide || height > kLargestSide) {
+  if (width == 0 || height == 0 || width > kLargestSide_px || height > kLargestSide_px) {
     return {InputReason::kBadImageSize,
             "camera info is for " + std::to_string(width) + "x" + std::to_string(height)};
   }

@@ -130,7 +130,7 @@ std::optional<InputProblem> TimeSynchronizer::add_camera_info(StampNs stamp_ns,
 }
 
 void TimeSynchronizer::pose_seen(StampNs stamp_ns, const std::optional<InputProblem>& problem) {
-  if (stamp_refused(problem)) return;
+  if (problem && !used_anyway(*problem)) return;
   const bool restarted = problem && problem->reason == InputReason::kStampsRestarted;
   newest_pose_ns_ = restarted ? stamp_ns : std::max(newest_pose_ns_.value_or(stamp_ns), stamp_ns);
 }

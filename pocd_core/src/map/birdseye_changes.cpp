@@ -1,8 +1,11 @@
 #include "birdseye_changes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <opencv2/imgproc.hpp>
+
+#include "pocd/common/check.hpp"
 
 namespace pocd {
 namespace {
@@ -53,6 +56,7 @@ std::array<Eigen::Vector2d, 4> floor_corners(const OrientedBox& box) {
 void draw_changes(const std::vector<BirdseyeChange>& changes, BirdseyeCanvas& canvas) {
   if (changes.empty()) return;
   for (const BirdseyeChange& change : changes) {
+    POCD_CHECK(change.before || change.after);
     const auto at = pixels(change.before ? *change.before : *change.after, canvas);
     for (int i = 0; i < 4; ++i) {
       if (change.before) {
@@ -92,16 +96,16 @@ std::vector<BirdseyeChange> changes_since(const std::vector<ObjectEvent>& events
       case EventKind::kRemoved:
         if (known == of.end()) {
           of[event.object].before = event.box;
-        } else if (known->second.before) {
-          known->second.after.reset();
         } else {
-          of.erase(known);
+          known->second.after.reset();
         }
         break;
     }
   }
   std::vector<BirdseyeChange> changes;
-  for (const auto& [object, change] : of) changes.push_back(change);
+  for (const auto& [object, change] : of) {
+    if (change.before || change.after) changes.push_back(change);  // else it came and went
+  }
   return changes;
 }
 

@@ -124,6 +124,7 @@ void MapPublisher::take_over(const MapDelta& step) {
   POCD_CHECK(step.epoch == epoch_ && step.base_version == version_);
   for (const TileKey& key : step.removed) {
     const auto known = tiles_.find(key);
+    POCD_CHECK(known != tiles_.end());
     bytes_ -= known->second.payload.size();
     tiles_.erase(known);
     const auto column = columns_.find({key.x, key.y});

@@ -13,7 +13,7 @@ constexpr float kBehind = -1e30f;   // signed distance of voxels that no valid p
 constexpr float kMinDepth = 0.01f;  // [m]; nearer voxels are left alone
 
 // What average() says about a voxel.
-constexpr std::int32_t kContradicted = 1, kApplied = 2, kFree = 4, kSurface = 8, kWasUnknown = 16,
+constexpr std::int32_t kContradicted = 1, kApplied = 2, kFree = 4, kSurface = 8, kWasEmpty = 16,
                        kChanged = 32;
 
 // GCC 12 vectorises a loop with a gather only where the arrays are restrict parameters, and mixed
@@ -113,7 +113,8 @@ POCD_KERNEL bool average(float truncation, float max_weight, float free_weight,
 
     const std::int32_t surface = (w_new > 0 ? kSurface : 0) & ~is_free & (contradicts ? 0 : -1);
     const std::int32_t now = contradicts | (apply & kApplied) | (is_free & kFree) | surface |
-                             (w_old == 0 ? kWasUnknown : 0) | (changed ? kChanged : 0);
+                             (w_old == 0 ? kWasEmpty : 0) | (t_old >= kFreeTsdf ? kWasEmpty : 0) |
+                             (changed ? kChanged : 0);
     state[i] = now;
     all |= now;
   }
@@ -132,7 +133,9 @@ POCD_KERNEL bool own(float band, const float* __restrict distance,
     const float s = distance[i];
     const std::int32_t now = state[i];
     const std::uint32_t old = owner[i];
-    const std::int32_t fresh = ((now & kWasUnknown) ? -1 : 0) & (s < 0.0f ? -1 : 0);
+    // The inside of a thing that came to where nothing was has its owner: past the band it ends in
+    // free space, with a back that nobody saw.
+    const std::int32_t fresh = ((now & kWasEmpty) ? -1 : 0) & (s < 0.0f ? -1 : 0);
     const std::int32_t near = ((s >= -band ? -1 : 0) & (s <= band ? -1 : 0)) | fresh;
     const std::int32_t applied = (now & kApplied) ? -1 : 0;
     const std::int32_t is_free = (now & kFree) ? -1 : 0;

@@ -95,6 +95,12 @@ double ViewMemory::seen_empty_share(const Points& points_W, StampNs before_ns, d
   return seen > 0 ? static_cast<double>(through) / static_cast<double>(seen) : 0.0;
 }
 
+void ViewMemory::set_clock_back(StampNs latest_ns) {
+  for (auto& [key, kept] : views_) {
+    for (View& view : kept) view.stamp_ns = std::min(view.stamp_ns, latest_ns);
+  }
+}
+
 std::size_t ViewMemory::size() const {
   std::size_t count = 0;
   for (const auto& [key, kept] : views_) count += kept.size();

@@ -125,7 +125,7 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   }
   object.confirmed = true;
   object.reported_box = object.box;
-  object.gained = object.lost = 0;
+  object.gained = object.eroded = object.returned = 0;
   object.added_ns = step.frame.stamp_ns;
   mark_changed(object);
   add_event(step, EventKind::kAdded, object, "confirmed");
@@ -142,7 +142,7 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found,
   found.confirmed = true;
   found.added_ns.reset();
   found.reported_box = found.box;
-  found.gained = found.lost = 0;
+  found.gained = found.eroded = found.returned = 0;
   ObjectEvent& event = add_event(step, EventKind::kMoved, found, rule);
   event.previous_box = from.box;
   event.absorbed = absorbed;
@@ -261,22 +261,22 @@ void ObjectTracker::report_changes(Step& step) {
     const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
     // Lost points at one end and gained as many at the other: it slid along itself.
     const double least = kSlidShare * static_cast<double>(object->model.surfels().size());
-    const bool slid =
-        (static_cast<double>(object->lost) > least && static_cast<double>(object->gained) > least &&
-         shift_m > notable_m && growth < notable_m) ||
-        slide(step, *object);
+    const bool slid = (static_cast<double>(object->eroded) > least &&
+                       static_cast<double>(object->gained) > least && shift_m > notable_m &&
+                       growth < notable_m) ||
+                      slide(step, *object);
     if (slid) {
       ObjectEvent& event = add_event(step, EventKind::kMoved, *object, "slid");
       event.previous_box = object->reported_box;
     } else if (shift_m > notable_m || growth > notable_m) {
       add_event(step, EventKind::kUpdated, *object,
-                object->lost > object->gained ? "part_removed" : "grew");
+                object->eroded > object->gained ? "part_removed" : "grew");
     } else {
       continue;
     }
     object->reported_box = object->box;
     // One that may be sliding is asked again with all that it gained and lost.
-    if (slid || !object->grew_ns) object->gained = object->lost = 0;
+    if (slid || !object->grew_ns) object->gained = object->eroded = object->returned = 0;
   }
   for (const LibraryObject* object : touched)
     step.result.changed_objects.push_back(snapshot(*object));

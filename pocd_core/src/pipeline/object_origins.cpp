@@ -21,8 +21,8 @@ constexpr double kArrivedShare = 0.3;
 constexpr double kSamePass_s = 4.0;
 /// Nothing is moved unseen in less time.
 constexpr double kAbsence_s = 5.0;
-/// An object that lost this share of its points lately is eaten away by free space.
-constexpr double kEatenShare = 0.12;
+/// An object that lost this share of its points lately is eroded by free space.
+constexpr double kErodedShare = 0.12;
 /// This share of the points at one end was seen through, lately or for good.
 constexpr double kSeenEndShare = 0.2;
 
@@ -162,26 +162,31 @@ bool ObjectTracker::revealed_by(const Step& step, const LibraryObject& found,
   return 2 * hidden > found.model.surfels().size();
 }
 
-bool ObjectTracker::is_eaten(const LibraryObject& object) {
+std::size_t ObjectTracker::missing(const LibraryObject& object) {
+  return object.eroded - std::min(object.eroded, object.returned);
+}
+
+bool ObjectTracker::is_eroded(const LibraryObject& object) {
   const auto surfels = static_cast<double>(object.model.surfels().size());
-  return static_cast<double>(object.lost) > kEatenShare * surfels;
+  return static_cast<double>(missing(object)) > kErodedShare * surfels;
+}
+
+bool ObjectTracker::beyond_sides(const OrientedBox& box, const Eigen::Vector3f& point_W) const {
+  const Eigen::AngleAxisd turn(-box.pose.yaw_rad, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d at = turn * (point_W.cast<double>() - box.pose.position_W);
+  return (at.cwiseAbs() - 0.5 * box.size_m).head<2>().maxCoeff() > 2.0 * config_.map.voxel_size_m;
 }
 
 bool ObjectTracker::reaches_beyond(const Observation& observation, const OrientedBox& box) const {
-  const double margin_m = 2.0 * config_.map.voxel_size_m;
-  const Eigen::AngleAxisd turn(-box.pose.yaw_rad, Eigen::Vector3d::UnitZ());
-  std::size_t beyond = 0;
-  for (const SurfacePoint& p : observation.points) {
-    const Eigen::Vector3d at = turn * (p.point_W.cast<double>() - box.pose.position_W);
-    const Eigen::Vector3d out = at.cwiseAbs() - 0.5 * box.size_m;
-    if (out.head<2>().maxCoeff() > margin_m) ++beyond;
-  }
+  const auto beyond =
+      std::count_if(observation.points.begin(), observation.points.end(),
+                    [&](const SurfacePoint& p) { return beyond_sides(box, p.point_W); });
   return static_cast<double>(beyond) >
          kArrivedShare * static_cast<double>(observation.points.size());
 }
 
 const OrientedBox& ObjectTracker::known_box(const LibraryObject& object) {
-  return is_eaten(object) ? object.reported_box : object.box;
+  return is_eroded(object) ? object.reported_box : object.box;
 }
 
 bool ObjectTracker::has_arrived(LibraryObject& object) const {
@@ -333,8 +338,8 @@ bool ObjectTracker::slide(Step& step, LibraryObject& object) {
     through += s.seen_through > 0;
   }
   // What was eroded there is gone for good.
-  const std::size_t gone = through + object.lost;
-  if (static_cast<double>(gone) < kSeenEndShare * static_cast<double>(there + object.lost)) {
+  const std::size_t gone = through + object.eroded;
+  if (static_cast<double>(gone) < kSeenEndShare * static_cast<double>(there + object.eroded)) {
     if (!object.grew_ns) object.box_before_growth = then, object.grew_ns = step.frame.stamp_ns;
     return false;
   }
@@ -343,6 +348,8 @@ bool ObjectTracker::slide(Step& step, LibraryObject& object) {
   }
   object.model.erode(kLeftBehind);
   object.icp_target.reset();
+  // Voxels of both ends are of the same owner: all go, and what is there comes back with the next
+  // looks.
   step.map.clear_object(object.id);
   object.grew_ns.reset();
   object.reported_box = then;

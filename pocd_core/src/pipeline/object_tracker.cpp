@@ -56,6 +56,23 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
   views_.add(cloud, frame.stamp_ns);
 }
 
+void ObjectTracker::set_clock_back(StampNs now_ns) {
+  const StampNs before_ns = now_ns - 1;
+  const auto bound = [before_ns](StampNs& stamp_ns) { stamp_ns = std::min(stamp_ns, before_ns); };
+  for (const auto& [id, object] : library_.all()) {
+    bound(object->first_seen_ns);
+    bound(object->last_seen_ns);
+    bound(object->verified_ns);
+    bound(object->contested_ns);
+    bound(object->contested_since_ns);
+    if (object->grew_ns) bound(*object->grew_ns);
+    if (object->added_ns) bound(*object->added_ns);
+    object->moment = {};
+  }
+  relocations_.set_clock_back(before_ns);
+  views_.set_clock_back(before_ns);
+}
+
 void ObjectTracker::find_candidates(Step& step) {
   const double reach = config_.map.max_depth_m;
   const ViewBall view = view_ball(step.cloud, reach);
@@ -85,13 +102,16 @@ void ObjectTracker::note_presence(Step& step) {
       if (step.observations.list[touch.observation].class_id == object.class_id)
         covered += touch.in_front;
     }
-    // Points where masks show another class do not show this object; without masks nothing does.
+    // Points where masks show another class do not show this object; without masks none speaks
+    // against it.
     const int other = step.frame.labels.empty() ? 0 : s.hit_other_class;
     const int own = s.hit - other;
-    // Nor does what free space left of it.
-    const double eaten = is_eaten(object) ? static_cast<double>(object.lost) : 0.0;
+    // Nor does what free space left of it: as much of that as of the rest would be in view.
+    const double in_view_share = static_cast<double>(in_view) / std::max(1, s.total);
+    const double eroded =
+        is_eroded(object) ? static_cast<double>(missing(object)) * in_view_share : 0.0;
     if (!step.association.doubtful[c] && own >= kPresentPoints &&
-        own >= kPresentShare * (in_view + eaten)) {
+        own >= kPresentShare * (in_view + eroded)) {
       object.verified_ns = step.frame.stamp_ns;
     } else if (step.association.doubtful[c] ||
                s.seen_through + covered + other > kContestedShare * in_view) {
@@ -109,8 +129,8 @@ void ObjectTracker::update_matched(Step& step) {
     const Sighting& sighting = candidates_[match.candidate].sighting;
     const Observation& observation = step.observations.list[match.observation];
     object.frames_seen_through = 0;
-    // What free space eats away does not grow on the other side: that may be where it went.
-    if (match.stationary && object.confirmed && is_eaten(object) &&
+    // What free space erodes does not grow on the other side: that may be where it went.
+    if (match.stationary && object.confirmed && is_eroded(object) &&
         reaches_beyond(observation, object.reported_box)) {
       step.moved_from[match.observation] = object.id;
       step.association.unassigned.push_back(match.observation);
@@ -138,6 +158,8 @@ void ObjectTracker::update_matched(Step& step) {
       // Discarded as evidence of this object; it may be where the object is now.
       step.moved_from[match.observation] = object.id;
       step.association.unassigned.push_back(match.observation);
+    } else if (!object.confirmed && moment_of(step, object).robots.size() == 1) {
+      ++object.frames_in_view;  // in its place, but not where its surface was taken to be
     }
   }
   for (const auto& piece : step.association.pieces) {
@@ -201,7 +223,7 @@ bool ObjectTracker::shift_object(Step& step, LibraryObject& object, const Match&
   object.moment = {};
   add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
   object.reported_box = object.box;
-  object.gained = object.lost = 0;
+  object.gained = object.eroded = object.returned = 0;
   step.owner_of_observation[match.observation] = to_index(object.id);
   return true;
 }
@@ -260,10 +282,10 @@ void ObjectTracker::update_unmatched(Step& step) {
     const Sighting& sighting = candidates_[c].sighting;
     const bool aware = config_.association.occlusion_aware;
     double share = aware ? sighting.visible_share() : sighting.in_view_share();
-    if (aware && is_eaten(object)) {
+    if (aware && is_eroded(object) && sighting.visible() >= kPresentPoints) {
       // Points that were dropped because they were seen through were seen, too.
-      const auto lost = static_cast<double>(object.lost);
-      share = (sighting.visible() + lost) / (sighting.total + lost);
+      const auto eroded = static_cast<double>(missing(object));
+      share = (sighting.visible() + eroded) / (sighting.total + eroded);
     }
     if (share < config_.association.min_visible_share) continue;
     Moment& moment = moment_of(step, object);
@@ -287,9 +309,9 @@ void ObjectTracker::erode(Step& step) {
       if (sights[i] == Sight::kHit) surfels[i].seen_through = 0;
     }
     if (config_.state.erode_frames == 0) continue;
-    if (const int lost = object.model.erode(config_.state.erode_frames); lost > 0) {
+    if (const int eroded = object.model.erode(config_.state.erode_frames); eroded > 0) {
       object.icp_target.reset();
-      object.lost += static_cast<std::size_t>(lost);
+      object.eroded += static_cast<std::size_t>(eroded);
       mark_changed(object);
       if (!object.model.surfels().empty()) refit_box(step, object);
     }
@@ -300,6 +322,12 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object, std::int32_t index) 
   const Observation& observation = step.observations.list[index];
   const int added = object.model.fuse(observation.points);
   object.gained += static_cast<std::size_t>(added);
+  // What comes back where it was is no loss: poses err, and thin outlines come and go.
+  const auto& all = object.model.surfels();
+  const auto back = std::count_if(all.end() - added, all.end(), [&](const Surfel& s) {
+    return !beyond_sides(object.reported_box, s.point_W);
+  });
+  object.returned += static_cast<std::size_t>(back);
   object.growing = added > kGrowingShare * static_cast<double>(object.model.surfels().size());
   object.cut = observation.cut_share > kCutShare;
   object.cut_above = observation.cut_above_share > kCutAboveShare;

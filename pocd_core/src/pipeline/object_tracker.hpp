@@ -28,6 +28,10 @@ class ObjectTracker {
               const Observations& observations, const GroundModel& ground, TsdfMap& map,
               std::vector<std::uint32_t>& owner_of_observation, FrameResult& result);
 
+  /// From now on stamps go on from `now_ns`, which lies before those that are kept: all that is
+  /// known becomes known from just before it.
+  void set_clock_back(StampNs now_ns);
+
  private:
   struct Step;  ///< what the parts of one update share
 
@@ -111,12 +115,16 @@ class ObjectTracker {
   /// Makes `found` the continuation of a removed object, and reports it as MOVED.
   void report_move(Step& step, LibraryObject& found, const RelocationMemory::Removed& origin,
                    const std::string& rule);
-  /// Free space took a notable share of its points since the last report.
-  static bool is_eaten(const LibraryObject& object);
+  /// Points that free space took since the last report and that did not come back.
+  static std::size_t missing(const LibraryObject& object);
+  /// Those are a notable share of its points.
+  static bool is_eroded(const LibraryObject& object);
+  /// Whether a point lies beside the box, by more than noise.
+  bool beyond_sides(const OrientedBox& box, const Eigen::Vector3f& point_W) const;
   /// A good part of what is observed lies outside of a box.
   bool reaches_beyond(const Observation& observation, const OrientedBox& box) const;
-  /// The box of an object when all of it was there: that of its last report while free space eats
-  /// it away, else the present one.
+  /// The box of an object when all of it was there: that of its last report while free space erodes
+  /// it, else the present one.
   static const OrientedBox& known_box(const LibraryObject& object);
   /// Whether a new object may be a known one elsewhere, by its size.
   bool may_be(const Step& step, const LibraryObject& found, const OrientedBox& known) const;

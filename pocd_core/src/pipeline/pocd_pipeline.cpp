@@ -2,9 +2,11 @@
 
 #include <time.h>
 
+#include <cstdio>
 #include <set>
 #include <string>
 
+#include "frame_clock.hpp"
 #include "object_tracker.hpp"
 #include "pocd/common/check.hpp"
 
@@ -37,6 +39,13 @@ class StageClock {
   double wall_, cpu_;
 };
 
+std::string behind_text(const Frame& frame, StampNs newest_ns) {
+  char text[64];
+  std::snprintf(text, sizeof(text), "stamp is %.1f s behind the newest",
+                static_cast<double>(newest_ns - frame.stamp_ns) * 1e-9);
+  return (frame.robot.empty() ? "" : frame.robot + ": ") + text;
+}
+
 }  // namespace
 
 struct PocdPipeline::Impl {
@@ -51,6 +60,7 @@ struct PocdPipeline::Impl {
   PipelineConfig config;
   ClassTable classes;
   ThreadPool pool;
+  FrameClock frame_clock;
   PoseGate pose_gate;
   GroundModel ground;
   ObjectTracker tracker;
@@ -84,6 +94,16 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   Impl& p = *impl_;
   p.check(frame);
   FrameResult result;
+  const StampNs newest_ns = p.frame_clock.newest_ns();
+  const FrameClock::Verdict verdict = p.frame_clock.judge(frame.stamp_ns);
+  if (verdict != FrameClock::Verdict::kGoesOn) {
+    const bool behind = verdict == FrameClock::Verdict::kBehind;
+    result.warnings.push_back(behind_text(frame, newest_ns) +
+                              (behind ? ": frame not used" : ": clocks were set back, goes on"));
+    result.accepted = !behind;
+    if (behind) return result;
+    p.tracker.set_clock_back(frame.stamp_ns);
+  }
   if (const auto reason = p.pose_gate.refuse(frame)) {
     result.accepted = false;
     result.warnings.push_back(*reason + ": frame not used");

@@ -46,6 +46,7 @@ class Output {
 template <class Step>
 Bytes decompress_by(const std::string& name, const std::uint8_t* data, std::size_t size,
                     std::size_t announced, const Step& step) {
+  if (size == 0 && announced == 0) return {};
   Output out(size, announced);
   std::size_t at = 0;
   for (std::size_t wanted = 1; wanted != 0 || at < size;) {

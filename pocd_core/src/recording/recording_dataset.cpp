@@ -295,8 +295,7 @@ class RecordingDataset : public DatasetReader {
   /// What was taken in spite of it is no message less.
   void say(const RecordedMessage& message, const std::optional<InputProblem>& problem) {
     if (!problem) return;
-    const bool taken = problem->reason == InputReason::kParentChanged ||
-                       problem->reason == InputReason::kStampsRestarted;
+    const bool taken = used_anyway(*problem);
     if (taken) {
       problems_.push_back(about(message, problem->detail));
     } else {

@@ -138,7 +138,8 @@ void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const De
     ++sum.count;
   };
   for (const std::int32_t i : cluster.members) {
-    const int step = std::max(1, static_cast<int>(pixels_per_spacing / cloud.depth_m[i] / 4.0));
+    const double pixels = pixels_per_spacing / cloud.depth_m[i];  // depth may be next to nothing
+    const int step = std::max(1, static_cast<int>(std::min(pixels / 4.0, 1e6)));
     if (grid.has(i, step)) take(i);
   }
   // A mask of stripes may have no pixel on that grid.

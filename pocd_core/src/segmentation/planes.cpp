@@ -287,16 +287,19 @@ PlaneVotes count_votes(const PlaneSegmentation& planes, const OrganizedCloud& cl
 /// the image's edge is too little for a plane, but a thing's ragged foot is not to be joined over
 /// it with the next one's.
 std::optional<float> ground_class_level(const OrganizedCloud& cloud, float band_m) {
-  constexpr std::size_t kPixels = 50;
+  constexpr double kLeastShare = 0.00086;  // of all pixels: 50 of 640x360 at every other one
   constexpr double kShare = 0.9;
+  const float camera_z = static_cast<float>(cloud.T_W_C.translation().z());
   std::vector<float> z;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (cloud.kind[i] == PixelKind::kGround) z.push_back(cloud.z_W[i]);
   }
-  if (z.size() < kPixels) return std::nullopt;
+  if (static_cast<double>(z.size()) < kLeastShare * static_cast<double>(cloud.size()))
+    return std::nullopt;
   const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
   std::nth_element(z.begin(), middle, z.end());
   const float level = *middle;
+  if (level >= camera_z) return std::nullopt;
   const auto near =
       std::count_if(z.begin(), z.end(), [&](float v) { return std::abs(v - level) <= band_m; });
   if (static_cast<double>(near) < kShare * static_cast<double>(z.size())) return std::nullopt;
@@ -365,7 +368,9 @@ void GroundModel::update(const PlaneSegmentation& planes, const SegmentationConf
   if (!known_) {
     if (const auto level =
             ground_class_level(cloud, 2.0f * static_cast<float>(config.ground_band_m))) {
-      known_ = from_class_ = true;
+      // A level is less than a plane: a floor that is found takes over, whatever tells it.
+      known_ = true;
+      from_class_ = false;
       normal_W_ = Eigen::Vector3f::UnitZ();
       offset_m_ = level_m_ = *level;
       is_strip_ = true;

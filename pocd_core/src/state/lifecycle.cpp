@@ -161,6 +161,15 @@ const std::deque<RelocationMemory::Removed>& RelocationMemory::recent(StampNs no
   return removed_;
 }
 
+void RelocationMemory::set_clock_back(StampNs latest_ns) {
+  for (Removed& r : removed_) {
+    for (StampNs* stamp_ns :
+         {&r.first_seen_ns, &r.verified_ns, &r.contested_since_ns, &r.removed_ns}) {
+      *stamp_ns = std::min(*stamp_ns, latest_ns);
+    }
+  }
+}
+
 void RelocationMemory::forget(ObjectId id) {
   removed_.erase(std::remove_if(removed_.begin(), removed_.end(),
                                 [&](const Removed& r) { return r.id == id; }),

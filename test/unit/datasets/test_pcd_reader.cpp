@@ -124,7 +124,18 @@ TEST(PcdReader, BadFilesAreSkippedWithAllTheirRepeats) {
   const std::string compressed(reinterpret_cast<const char*>(few), 8);
   std::string wide = good;
   wide.replace(wide.find("WIDTH 8"), 7, "WIDTH 48").replace(wide.find("HEIGHT 6"), 8, "HEIGHT 0");
-  const std::string cases[] = {"hello",
+  // The same with tabs and indented, as PCL reads it, too.
+  std::string tabs = announcing("DATA\tbinary\n");
+  for (std::size_t at = 0; (at = tabs.find("WIDTH ", at)) != std::string::npos;)
+    tabs.replace(at, 6, " WIDTH\t");
+  std::string no_number = good, no_width = good, ends = good.substr(0, good.find("DATA"));
+  no_number.replace(no_number.find("WIDTH 8"), 7, "WIDTH 8x");
+  no_width.replace(no_width.find("WIDTH 8"), 7, "BREADTH 8");
+  const std::string cases[] = {tabs,
+                               no_number,
+                               no_width,
+                               ends + "DATA binary",
+                               "hello",
                                "",
                                ascii_pcd(kLabels, false),
                                other_size,

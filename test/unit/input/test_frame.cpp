@@ -73,7 +73,7 @@ TEST(Frame, ErrorsNameSourceFieldAndValue) {
   CameraModel no_focal = kCamera;
   no_focal.fx = 0.0;
   Pose far = Pose::Identity();
-  far.translation().x() = -1.1e6;
+  far.translation().x() = -5.1e4;
   const std::pair<std::string, std::string> cases[] = {
       {error_of([&] { make(small); }), "depth image is 4x2"},
       {error_of([&] { make(cv::Mat()); }), "depth image is 0x0"},

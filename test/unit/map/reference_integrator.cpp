@@ -87,6 +87,7 @@ void ReferenceIntegrator::fuse(const IntegrationInput& input, VoxelBlock& block)
     std::uint16_t& weight = block.weight[i];
     std::uint32_t& owner = block.owner[i];
     const bool unknown = weight == 0;
+    const bool empty = unknown || tsdf >= kFree;
     if (seen.distance >= truncation && !unknown && tsdf < kFree) {  // the surface has gone
       if (beside_an_edge(input, seen, truncation)) continue;
       const int w = weight / 2;
@@ -107,7 +108,7 @@ void ReferenceIntegrator::fuse(const IntegrationInput& input, VoxelBlock& block)
         static_cast<std::uint16_t>(std::min(w + 1.0f, free ? std::min(cap, kFreeWeight) : cap));
     if (free) {
       owner = 0;
-    } else if (std::abs(seen.distance) <= band || (unknown && seen.distance < 0.0f)) {
+    } else if (std::abs(seen.distance) <= band || (empty && seen.distance < 0.0f)) {
       owner = seen.owner;
     }
   }

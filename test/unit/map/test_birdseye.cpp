@@ -156,6 +156,15 @@ TEST(Birdseye, EventsOfOneObjectAreOneChange) {
   EXPECT_FALSE(changes[2].before);  // 5: new, and was called 4 before
   EXPECT_EQ(changes[2].after->pose.position_W.x(), 9.0);
   EXPECT_TRUE(changes_since(events, 18).empty());
+
+  // New, gone, and found again elsewhere: it was nowhere before.
+  const auto came_back =
+      changes_since({event(EventKind::kAdded, 1, 10, 0), event(EventKind::kRemoved, 1, 11, 0),
+                     event(EventKind::kMoved, 1, 12, 4)},
+                    10);
+  ASSERT_EQ(came_back.size(), 1u);
+  EXPECT_FALSE(came_back[0].before);
+  EXPECT_EQ(came_back[0].after->pose.position_W.x(), 4.0);
 }
 
 TEST(Birdseye, CeilingIsNotDrawn) {

@@ -45,7 +45,7 @@ struct TruthCamera {
   CameraModel model;
   template <class Visitor>
   void describe(Visitor& visit) {
-    const Range pixels{1, 16384};
+    const Range pixels{1, kLargestSide_px};
     visit("width", model.width, pixels, "[px].");
     visit("height", model.height, pixels, "[px].");
     visit("fx", model.fx, pixels, "[px].");

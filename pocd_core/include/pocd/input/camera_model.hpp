@@ -28,7 +28,11 @@ struct CameraModel {
   }
 };
 
-/// "" or the first field that no camera has, with its value and the rule: sizes are in [1, 16384];
+/// No image is larger, whoever announces it.
+inline constexpr int kLargestSide_px = 16384;
+
+/// "" or the first field that no camera has, with its value and the rule: sizes are in
+/// [1, kLargestSide_px];
 /// all intrinsics are finite; a focal length is 1/20 to 100 times its side of the image; the
 /// principal point lies at most one image beyond the border. What a frame costs is bounded by that.
 std::string camera_fault(const CameraModel& camera);

@@ -39,7 +39,7 @@ Frame make_frame(StampNs stamp_ns, const CameraModel& camera, const Pose& T_W_C,
                  const std::string& source);
 
 /// Throws InputError unless T is finite, its rotation orthonormal within 1e-3, and its translation
-/// at most 1000 km: what places are kept in has whole numbers.
+/// at most 50 km: points are kept in single precision, which tells 4 mm apart there.
 void validate_pose(const Pose& T, const std::string& source);
 
 /// Throws InputError, naming `source`, the field and the value, unless make_frame could have made

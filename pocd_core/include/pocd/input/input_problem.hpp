@@ -41,6 +41,13 @@ struct InputProblem {
   std::string detail;  ///< field and value
 };
 
+/// Whether the data that the problem is about is used all the same.
+inline bool used_anyway(const InputProblem& problem) {
+  return problem.reason == InputReason::kParentChanged ||
+         problem.reason == InputReason::kStampsRestarted ||
+         problem.reason == InputReason::kCameraChanged;
+}
+
 /// A value, or what is wrong with the message that should have given it.
 template <class T>
 struct Checked {

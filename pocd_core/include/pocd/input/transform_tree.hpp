@@ -36,11 +36,11 @@ class TransformTree {
                          const TransformTree* shared = nullptr);
 
   /// A transform that holds for all time; replaces what was known of `child`. kParentChanged when
-  /// that had another parent.
+  /// that had another parent; kTooLarge, and nothing stored, for one frame more than there may be.
   std::optional<InputProblem> set_static(const std::string& parent, const std::string& child,
                                          const PoseQuaternion& T);
-  /// kStampBackwards: the pose is not stored. kParentChanged, kStampsRestarted: it is, and the
-  /// child starts anew.
+  /// kStampBackwards, kTooLarge: the pose is not stored. kParentChanged, kStampsRestarted: it is,
+  /// and the child starts anew.
   std::optional<InputProblem> add(const std::string& parent, const std::string& child,
                                   StampNs stamp_ns, const PoseQuaternion& T);
 

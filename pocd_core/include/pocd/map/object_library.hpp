@@ -48,7 +48,7 @@ struct LibraryObject {
   std::set<std::string> seen_by;  ///< robots that have observed it
   Moment moment;                  ///< the last one
   std::uint32_t observations = 0;
-  int frames_in_view = 0;           ///< tentative only: without being matched
+  int frames_in_view = 0;           ///< tentative only: without being fused
   int frames_seen_through = 0;      ///< in a row
   int frames_displaced = 0;         ///< in a row
   int frames_odd = 0;               ///< in a row, much of it beside its surface, aligned in place
@@ -60,7 +60,8 @@ struct LibraryObject {
   bool cut = false;                 ///< the last observation went on out of sight
   bool cut_above = false;           ///< the same, above it
   std::size_t gained = 0;           ///< points since the last event
-  std::size_t lost = 0;             ///< points since the last event
+  std::size_t eroded = 0;           ///< points since the last event
+  std::size_t returned = 0;         ///< points since the last event, in the box of that event
   std::optional<StampNs> added_ns;  ///< when reported as new; unset for what was known before
   ObjectId moved_from = ObjectId::kNone;  ///< tentative: the object that it may be, elsewhere
   bool changed = false;                   ///< since the last FrameResult

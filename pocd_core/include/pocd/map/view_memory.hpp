@@ -23,6 +23,9 @@ class ViewMemory {
   double seen_empty_share(const Points& points_W, StampNs before_ns, double max_depth_m,
                           double margin_m) const;
 
+  /// No view that is kept is newer than `latest_ns` from here on.
+  void set_clock_back(StampNs latest_ns);
+
   std::size_t size() const;
 
  private:
@@ -34,8 +37,8 @@ class ViewMemory {
   };
   static constexpr StampNs kRenew_ns = 10'000'000'000;
 
-  /// Views by place of the camera (metre cells) and heading (octants): the latest, and one at least
-  /// kRenew_ns older.
+  /// Views by place of the camera (cells of half a metre) and heading (octants): the latest, and
+  /// one at least kRenew_ns older.
   std::unordered_map<std::uint64_t, std::vector<View>> views_;  ///< looked up, never iterated
 };
 

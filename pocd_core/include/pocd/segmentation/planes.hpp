@@ -60,7 +60,7 @@ class GroundModel {
   bool from_class_ = false;
   Eigen::Vector3f normal_W_ = Eigen::Vector3f::UnitZ();
   float offset_m_ = 0.0f;
-  float level_m_ = 0.0f;  ///< where the plane was seen [m, W]
+  float level_m_ = 0.0f;  ///< height of the ground where it was seen [m, W]
   bool is_strip_ = false;
 };
 

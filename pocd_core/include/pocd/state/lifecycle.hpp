@@ -77,6 +77,8 @@ class RelocationMemory {
   /// are forgotten. Valid until the next call.
   const std::deque<Removed>& recent(StampNs now_ns, double window_s);
   void forget(ObjectId id);
+  /// Nothing that is remembered happened after `latest_ns`.
+  void set_clock_back(StampNs latest_ns);
 
  private:
   std::deque<Removed> removed_;
