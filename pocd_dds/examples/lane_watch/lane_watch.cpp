@@ -1,9 +1,6 @@
-// A fleet manager's view of one lane: what comes to stand on it, what was seen to leave it, and
-// when nobody knows. Free is a lane with nothing on it, nothing unknown, and a component that
-// looks.
-//
-// Nobody tells of a thing that was carried away while the component was down: its place stays
-// unknown until a person has looked and starts this program anew.
+// A fleet manager's view of one lane: what stands on it, what was seen to leave it, and when nobody
+// knows. Free: nothing on it, nothing unknown, and a component that looks. What was carried away
+// while the component was down stays unknown until a person has looked and starts this anew.
 #include <unistd.h>
 
 #include <algorithm>
@@ -35,10 +32,7 @@ int main(int argc, char** argv) {
   for (int i = 2; i < argc; ++i)
     (i == 2 ? lane.width_m : lane.xy.emplace_back()) = std::atof(argv[i]);
   if (lane.xy.size() < 4 || lane.xy.size() % 2 != 0) {
-    std::fputs(
-        "usage: lane_watch DOMAIN WIDTH X1 Y1 X2 Y2 [X3 Y3 ...]\n"
-        "metres of the map frame; runs until killed\n",
-        stderr);
+    std::fputs("usage: lane_watch DOMAIN WIDTH X1 Y1 X2 Y2 [X3 Y3 ...], in metres\n", stderr);
     return 2;
   }
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
@@ -79,9 +73,8 @@ int main(int argc, char** argv) {
                 event.evidence.rule.c_str());
   };
   const pocd::ObjectWatch watch(options);
-  for (int before = -1;; sleep(1)) {
-    const int present = watch.publisher_present();
+  for (int before = -1, present = 0;; before = present, sleep(1)) {
+    present = watch.publisher_present();
     if (present != before) std::puts(present ? "component is there" : "no component: nobody looks");
-    before = present;
   }
 }
