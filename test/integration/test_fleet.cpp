@@ -135,6 +135,28 @@ TEST(Fleet, ASilentStreamHoldsNobodyForEver) {
   EXPECT_EQ(node.wait().exit_code, 0);
 }
 
+// Neither odometry nor tf says where its camera is; that tf says so of others does not help it.
+TEST(Fleet, ARobotWithoutPosesHoldsNobodyForEver) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  RobotSender lost(bus, "lost");
+  TransformSender tf(bus, dds::topics::kTf);
+  Process node(fleet_command(domain, {"--lossless", "--set", "node.segmentation=absent", "--set",
+                                      "node.silent_wait_s=0.5"}));
+  ASSERT_TRUE(
+      eventually([&] { return health.newest() != nullptr && lost.matched() && tf.matched(); }));
+  constexpr int kImages = 32 + 8;  // in its synchroniser and its reader
+  for (int i = 1; i <= kImages; ++i) lost.send_image(i * 33 * kMs);
+  StampNs stamp_ns = 0;
+  EXPECT_TRUE(eventually([&] {
+    tf.send({{"map", "other_camera", stamp_ns += 20 * kMs, {}}});
+    return health.problem("rt/lost/odom or rt/tf", "silent_stream") == 1;
+  })) << node.err();
+  node.signal(SIGTERM);
+  EXPECT_EQ(node.wait().exit_code, 0);
+}
+
 // Object identifiers begin with the epoch: no two runs share one.
 TEST(Fleet, NodesAndRestartsHaveEpochsOfTheirOwn) {
   const TestDomain domain;
