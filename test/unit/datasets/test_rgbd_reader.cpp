@@ -118,7 +118,7 @@ const Defect kDefects[] = {
      "truncated"},
     {"empty_depth", [](const ScratchFolder& f) { f.write(stem(1) + ".depth.png", ""); }, "empty"},
     {"depth_is_text", [](const ScratchFolder& f) { f.write(stem(1) + ".depth.png", "hello"); },
-     "no image"},
+     "no PNG, JPEG or OpenEXR image"},
     {"damaged_depth",
      [](const ScratchFolder& f) {
        std::fstream file(f / (stem(1) + ".depth.png"),

@@ -208,13 +208,15 @@ TEST_F(ClearObject, OwnersWrittenByHandAreFound) {
 }
 
 TEST_F(ClearObject, SurfaceSeenAsBackgroundLosesItsOwner) {
-  // Within a voxel of the surface, where the mesh gets its owners; a quarter of the truncation.
+  // Within a voxel of the surface, where the mesh gets its owners; a quarter of the truncation. On
+  // the side that is seen; the back, from the outline on, stays whose it was.
   const auto at_surface = [this] {
     std::size_t count = 0;
     for (const BlockKey& key : map.sorted_keys()) {
       const VoxelBlock& block = *map.find(key);
       for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
-        count += block.owner[v] == 3 && std::abs(block.tsdf[v]) < 32767 / 4;
+        count += block.owner[v] == 3 && std::abs(block.tsdf[v]) < 32767 / 4 &&
+                 voxel_center(key, v, 0.05).y() < 1.4;
       }
     }
     return count;
