@@ -122,30 +122,29 @@ TEST(TsdfChange, NewThingAppearsInSpaceKnownToBeFree) {
   EXPECT_GT(ball, 100);
 }
 
-// Behind its front, within the truncation, the map takes a thing to be solid; behind that is the
+// Behind its front, within the truncation, the map takes a thing to be solid; behind that may be
 // free space from before. That back belongs to it, so that it goes with it.
 TEST(TsdfChange, NewThingInFreeSpaceOwnsItsBack) {
   ThreadPool pool(1);
   TsdfMap map(coarse_config());
   const Pose pose = camera_pose({0, 0, 1}, 0, 0);
-  for (int i = 0; i < 20; ++i) map.integrate(look({2.5, {}}, pose).input(), pool);
-  const Scene with_ball{2.5, {{{0.0, 1.5, 1.0}, 0.4, 6}}};
-  for (int i = 0; i < 20; ++i) map.integrate(look(with_ball, pose).input(), pool);
-  const auto of_ball = [&] {
+  // Free space is kept where surfaces are near.
+  const Sphere behind{{0.0, 1.9, 1.0}, 0.3, 5}, thing{{0.0, 1.4, 1.0}, 0.2, 6};
+  for (int i = 0; i < 20; ++i) map.integrate(look({2.5, {behind}}, pose).input(), pool);
+  for (int i = 0; i < 20; ++i) map.integrate(look({2.5, {behind, thing}}, pose).input(), pool);
+  const auto before_the_other = [&] {
     int own = 0, other = 0;
     const Mesh mesh = extract_mesh(map, 2, pool);
     for (std::size_t i = 0; i < mesh.vertices_W.size(); ++i) {
-      // What is cut by the outline borders on what is seen beside it.
-      const Eigen::Vector3f p = mesh.vertices_W[i] - Eigen::Vector3f(0.0f, 1.5f, 1.0f);
-      if (std::hypot(p.x(), p.z()) > 0.25f || p.y() > 0.3f) continue;
-      (mesh.owner[i] == 6 ? own : other) += 1;
+      const Eigen::Vector3f p = mesh.vertices_W[i] - Eigen::Vector3f(0.0f, 0.0f, 1.0f);
+      if (p.y() < 1.5f && std::hypot(p.x(), p.z()) < 0.12f) ++(mesh.owner[i] == 6 ? own : other);
     }
     return std::make_pair(own, other);
   };
-  EXPECT_GT(of_ball().first, 100);
-  EXPECT_EQ(of_ball().second, 0);
+  EXPECT_GT(before_the_other().first, 20);
+  EXPECT_EQ(before_the_other().second, 0);
   map.clear_object(ObjectId{6});
-  EXPECT_EQ(of_ball(), std::make_pair(0, 0));
+  EXPECT_EQ(before_the_other(), std::make_pair(0, 0));
 }
 
 class ClearObject : public ::testing::Test {
