@@ -23,7 +23,7 @@ std::string built_lane_watch(const TemporaryFolder& folder) {
 
 TEST(Example, LaneWatchSeesWhatComesAndGoes) {
   const std::string text = read_text(source("pocd_dds/examples/lane_watch/lane_watch.cpp"));
-  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 80) << "is to be read at a glance";
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 60) << "is to be read at a glance";
   const TemporaryFolder folder;
   const std::string program = built_lane_watch(folder);
   ASSERT_FALSE(HasFailure());

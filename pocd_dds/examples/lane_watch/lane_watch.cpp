@@ -1,31 +1,12 @@
-// A fleet manager's view of one lane: what stands on it, what was seen to leave it, and when nobody
-// knows. Free: nothing on it, nothing unknown, and a component that looks. What was carried away
+// What stands on a lane, what was seen to leave it, and when nobody knows: what was carried away
 // while the component was down stays unknown until a person has looked and starts this anew.
 #include <unistd.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <pocd_dds/object_watch.hpp>
-#include <vector>
-
-struct Lane {
-  double width_m = 0.0;
-  std::vector<double> xy;  // x and y of the points that it leads through
-  bool has(const pocd::OrientedBox& box) const {
-    double nearest = INFINITY;
-    for (std::size_t i = 0; i + 3 < xy.size(); i += 2) {
-      const double dx = xy[i + 2] - xy[i], dy = xy[i + 3] - xy[i + 1];
-      const double px = box.pose.position_W.x() - xy[i], py = box.pose.position_W.y() - xy[i + 1];
-      const double along = (px * dx + py * dy) / std::max(dx * dx + dy * dy, 1e-9);
-      const double t = std::clamp(along, 0.0, 1.0);
-      nearest = std::min(nearest, std::hypot(px - t * dx, py - t * dy));
-    }
-    return nearest < 0.5 * (width_m + std::hypot(box.size_m.x(), box.size_m.y()));
-  }
-};
+#include "lane.hpp"
 
 int main(int argc, char** argv) {
   Lane lane;
@@ -36,7 +17,6 @@ int main(int argc, char** argv) {
     return 2;
   }
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-
   // By uuid. Unknown: seen on the lane before the component restarted, and not seen since.
   std::map<std::array<std::uint8_t, 16>, pocd::OrientedBox> on_lane, unknown;
   const auto tell = [&](const char* what, const pocd::WatchedObject& object) {
