@@ -72,7 +72,7 @@ struct Sighting {
 
 /// Projects the model into the frame. Surfels facing away are out of view. Margin: config.margin_m
 /// or three sigma of the depth noise, whichever is larger.
-void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
+void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_hits,
                   const OrganizedCloud& cloud, const DepthField& field,
                   const Observations& observations, const SightConfig& config,
                   const DepthNoise& noise, Sighting& out);
