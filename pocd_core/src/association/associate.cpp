@@ -73,11 +73,12 @@ IcpOptions icp_options(const LibraryObject& object, const AssociationConfig& con
 }  // namespace
 
 std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
-                                    const Pose& T_W_C, const AssociationConfig& config) {
+                                    const Pose& T_W_C, const Pose& start,
+                                    const AssociationConfig& config) {
   if (object.model.surfels().empty() || observation.points.empty()) return std::nullopt;
   const Points source = icp_source(observation, config);
   const auto target = target_of(object, config.icp_max_distance_m);
-  return match_of(point_to_plane_icp(*target, source, icp_options(object, config)), source, T_W_C,
+  return match_of(point_to_plane_icp(*target, source, icp_options(object, config), start), source, T_W_C,
                   config);
 }
 

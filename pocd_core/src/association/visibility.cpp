@@ -111,7 +111,8 @@ void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_
       continue;
     }
     const float margin = std::max(static_cast<float>(config.margin_m),
-                                  3.0f * static_cast<float>(noise.sigma(at.depth_m)));
+                                  3.0f * static_cast<float>(noise.sigma(at.depth_m)) +
+                                      static_cast<float>(config.pose_tolerance_m));
     const float difference = cloud.depth_m[pixel] - at.depth_m;
     Sight sight = Sight::kUnknown;
     if (!is_measurement(cloud.kind[pixel])) {

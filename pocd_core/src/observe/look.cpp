@@ -14,8 +14,13 @@ constexpr int kLeastPoints = 5;
 constexpr double kMajority = 0.5;
 /// A place is contested when this share of what is seen of it is seen through or covered.
 constexpr double kContestedShare = 0.25;
+/// From this share on it is asked whether what stands there fits its surface.
+constexpr double kDoubtfulShare = 0.1;
 /// What was measured within its box fits the surface of an object that is in its place.
 constexpr double kFittingShare = 0.75;
+constexpr std::size_t kFitBudget = 200;
+/// Points of a surface lie within so many spacings of a surfel, beside their noise.
+constexpr double kFitSpacings = 0.75;
 /// The surface at its new place explains the frame when no more than this share contradicts it.
 constexpr double kLeftOverShare = 0.15;
 /// A new object's first surfels were measured once; later ones bear witness after the second time.
@@ -74,10 +79,13 @@ std::int32_t main_observation(const Sighting& s, const Observations& observation
 double fit_in_box(const LibraryObject& object, const Observation& observation) {
   const double spacing_m = object.model.spacing_m();
   int within = 0, on = 0;
-  for (const SurfacePoint& p : observation.points) {
+  const std::size_t step = std::max<std::size_t>(1, observation.points.size() / kFitBudget);
+  for (std::size_t i = 0; i < observation.points.size(); i += step) {
+    const SurfacePoint& p = observation.points[i];
     if (!is_inside(object.box, spacing_m, p.point_W)) continue;
     ++within;
-    on += object.model.nearest(p.point_W, static_cast<float>(1.5 * spacing_m)) != ObjectModel::kNone;
+    const auto radius = static_cast<float>(kFitSpacings * spacing_m) + 2.0f * p.sigma_m;
+    on += object.model.nearest(p.point_W, radius) != ObjectModel::kNone;
   }
   return within > 0 ? static_cast<double>(on) / within : 0.0;
 }
@@ -121,14 +129,15 @@ void judge(const OrganizedCloud& cloud, const DepthField& field, const Observati
   look.observation = main_observation(s, observations, object.class_id);
   const Tally tally = tally_of(s, observations, object.class_id, look.observation);
   look.contested = tally.contested_share() > kContestedShare;
-  look.fits = !look.contested || look.observation == Observations::kNone ||
+  look.fits = tally.contested_share() < kDoubtfulShare || look.observation == Observations::kNone ||
               fit_in_box(object, observations.list[look.observation]) >= kFittingShare;
   const int visible = tally.here + tally.through;
   if (visible < kLeastPoints) {
     if (s.occluded + tally.covered >= kLeastPoints) look.verdict = Verdict::kHidden;
   } else if (tally.through > kMajority * visible) {
     look.verdict = Verdict::kUnobserved;
-  } else if (!look.fits && tally.through >= kLeastPoints) {
+  } else if (!look.fits && tally.through >= kLeastPoints &&
+             tally.through > kContestedShare * visible) {
     look.verdict = Verdict::kUnobserved;
   } else {
     look.verdict = Verdict::kInPlace;
@@ -146,32 +155,53 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     if (is_inside(object.box, config.icp_max_distance_m, p.point_W)) around.points.push_back(p);
   }
   if (around.points.size() < static_cast<std::size_t>(2 * kLeastPoints)) return;
-  const auto match = align_in_place(object, around, cloud.T_W_C, config);
-  if (!match || match->displacement_m < least_m || match->displacement_m > config.max_distance_m)
-    return;
-  // An edge that fits says nothing of where the rest went.
-  const Eigen::Vector3d& center_W = object.box.pose.position_W;
-  if ((match->T_new_old * center_W - center_W).norm() > match->displacement_m + 2.0 * least_m) return;
-  std::vector<Surfel> moved = object.model.surfels();
-  const Eigen::Isometry3f T = match->T_new_old.cast<float>();
-  for (Surfel& s : moved) {
-    s.point_W = T * s.point_W;
-    s.normal_W = T.linear() * s.normal_W;
+  const Tally before = tally_of(look.sighting, observations, object.class_id, look.observation);
+  // Its old place must be seen empty in part, and enough of it be seen to tell.
+  const int told = before.here + before.through + before.covered;
+  if (before.through < kLeastPoints || told < config.min_visible_share * look.sighting.total) return;
+
+  // A wall says nothing of how far it slid along itself: each end may be the one that is seen.
+  const double yaw = object.box.pose.yaw_rad + (object.box.size_m.x() < object.box.size_m.y() ? M_PI_2 : 0.0);
+  const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
+  double low = 1e9, high = -1e9;
+  for (const SurfacePoint& p : around.points) {
+    const double at = (p.point_W.cast<double>() - object.box.pose.position_W).dot(along_W);
+    low = std::min(low, at), high = std::max(high, at);
   }
-  static thread_local Sighting there;
-  sight_object(moved, object.class_id, min_hits(object), cloud, field, observations, sight, noise,
-               there);
-  const Tally before =
-      tally_of(look.sighting, observations, object.class_id, look.observation);
-  const Tally after = tally_of(there, observations, object.class_id, look.observation);
-  if (after.contested_share() > kLeftOverShare || after.here < before.here ||
-      after.here < 2 * kLeastPoints) {
-    return;
+  const double half = 0.5 * object.box.size_m.head<2>().maxCoeff();
+  double best_share = kLeftOverShare;
+  for (const double slid_m : {0.0, high - half, low + half}) {
+    if (slid_m != 0.0 && (std::abs(slid_m) < least_m || std::abs(slid_m) > config.max_distance_m))
+      continue;
+    Pose start = Pose::Identity();
+    start.translation() = -slid_m * along_W;
+    const auto match = align_in_place(object, around, cloud.T_W_C, start, config);
+    if (!match || match->displacement_m < least_m || match->displacement_m > config.max_distance_m)
+      continue;
+    // An edge that fits says nothing of where the rest went.
+    const Eigen::Vector3d& center_W = object.box.pose.position_W;
+    if ((match->T_new_old * center_W - center_W).norm() > match->displacement_m + 2.0 * least_m)
+      continue;
+    std::vector<Surfel> moved = object.model.surfels();
+    const Eigen::Isometry3f T = match->T_new_old.cast<float>();
+    for (Surfel& s : moved) {
+      s.point_W = T * s.point_W;
+      s.normal_W = T.linear() * s.normal_W;
+    }
+    static thread_local Sighting there;
+    sight_object(moved, object.class_id, min_hits(object), cloud, field, observations, sight, noise,
+                 there);
+    const Tally after = tally_of(there, observations, object.class_id, look.observation);
+    if (after.contested_share() > best_share || after.here < before.here ||
+        after.here < 2 * kLeastPoints) {
+      continue;
+    }
+    best_share = after.contested_share();
+    look.verdict = Verdict::kDisplaced;
+    look.T_new_old = match->T_new_old;
+    look.displacement_m = match->displacement_m;
+    look.sign = match->sign;
   }
-  look.verdict = Verdict::kDisplaced;
-  look.T_new_old = match->T_new_old;
-  look.displacement_m = match->displacement_m;
-  look.sign = match->sign;
 }
 
 }  // namespace pocd

@@ -86,12 +86,13 @@ class Divider {
     std::vector<SurfacePoint> points = observation.points;
     for (const std::int32_t i : rest) points[i].arrived = seen_empty_(points[i].point_W);
     // One instance is one thing, whatever stands before it.
-    if (rest.size() == observation.points.size() && observation.instance != 0) {
-      add(index, nullptr, rest, points, parts);
-      return;
+    std::vector<std::vector<std::int32_t>> pieces;
+    if (observation.instance != 0) {
+      pieces.push_back(rest);
+    } else {
+      pieces = pieces_of(points, rest, config_.spacing_m, reach_m());
+      merge_overlapping(points, pieces);
     }
-    auto pieces = pieces_of(points, rest, config_.spacing_m, reach_m());
-    merge_overlapping(points, pieces);
     for (const auto& piece : pieces) {
       std::size_t in_free = 0;
       for (const std::int32_t i : piece) in_free += points[i].arrived;
@@ -139,7 +140,11 @@ class Divider {
     foreign_.clear();
     for (std::size_t c = 0; c < count_; ++c) {
       Look& look = looks_[c];
-      if (look.verdict == Verdict::kUnobserved || look.verdict == Verdict::kDisplaced) continue;
+      // What stands of an object of which most is gone is still its surface.
+      if (look.verdict == Verdict::kDisplaced ||
+          (look.verdict == Verdict::kUnobserved && !look.fits)) {
+        continue;
+      }
       if (box_overlap(look.object->box, observation.box, 4.0 * config_.spacing_m) <= 0.0) continue;
       const bool same_class = look.object->class_id == observation.class_id;
       const bool same_thing = observation.instance == 0 || look.observation == index ||
@@ -215,7 +220,7 @@ class Divider {
       const int count = contacts(piece, points, *owner.look);
       if (count <= most) continue;
       beside_contested |= owner.look->contested;
-      if (owner.look->contested || (arrived && owner.look->object->arrival != Arrival::kArrived))
+      if (owner.look->contested || owner.look->verdict == Verdict::kUnobserved || (arrived && owner.look->object->arrival != Arrival::kArrived))
         continue;
       most = count;
       best = owner.look;
@@ -224,7 +229,10 @@ class Divider {
       // The masks say that it is one thing with what is known of it.
       int shared = kLeastShared - 1;
       for (const Owner& owner : owners_) {
-        if (owner.explained <= shared || owner.look->contested) continue;
+        if (owner.explained <= shared || owner.look->contested ||
+            owner.look->verdict == Verdict::kUnobserved) {
+          continue;
+        }
         shared = owner.explained;
         best = owner.look;
       }

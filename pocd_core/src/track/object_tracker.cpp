@@ -77,7 +77,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                            TsdfMap& map, std::vector<std::uint32_t>& owner_of_pixel,
                            FrameResult& result) {
   Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}};
-  step.sight = {0.5 * config_.change.tau_m, config_.change.pose_tolerance_m,
+  step.sight = {(getenv("M") ? atof(getenv("M")) : 1.0) * config_.map.voxel_size_m, config_.change.pose_tolerance_m,
                 config_.map.max_depth_m};
   look_at_objects(step);
   update_beliefs(step);

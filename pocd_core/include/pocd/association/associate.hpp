@@ -22,10 +22,11 @@ struct Match {
   double cost = 0.0;
 };
 
-/// How an object that is still about where it was may have moved: point-to-plane ICP from its
-/// place, which moves it along no direction that its surface leaves open. Nothing when it does not
+/// How an object that is still about where it was may have moved: point-to-plane ICP from `start`
+/// (takes the observation to the object), which moves it along no direction that its surface leaves open. Nothing when it does not
 /// fit.
 std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
-                                    const Pose& T_W_C, const AssociationConfig& config);
+                                    const Pose& T_W_C, const Pose& start,
+                                    const AssociationConfig& config);
 
 }  // namespace pocd
