@@ -18,6 +18,8 @@ constexpr double kContestedShare = 0.25;
 constexpr double kDoubtfulShare = 0.1;
 /// What was measured within its box fits the surface of an object that is in its place.
 constexpr double kFittingShare = 0.75;
+/// Two solid things do not share so much of one place.
+constexpr double kTakenShare = 0.5;
 constexpr std::size_t kFitBudget = 200;
 /// Points of a surface lie within so many spacings of a surfel, beside their noise.
 constexpr double kFitSpacings = 0.75;
@@ -146,19 +148,28 @@ void judge(const OrganizedCloud& cloud, const DepthField& field, const Observati
 
 void align(const OrganizedCloud& cloud, const DepthField& field, const Observations& observations,
            const SightConfig& sight, const DepthNoise& noise, const AssociationConfig& config,
-           double least_m, Look& look) {
+           double least_m, const Look* looks, std::size_t count, Look& look) {
   if (!look.contested || look.observation == Observations::kNone) return;
   LibraryObject& object = *look.object;
+  const double spacing_m = object.model.spacing_m();
   // What lies around the object; a neighbour that is one piece with it in the image stays out.
   Observation around;
   for (const SurfacePoint& p : observations.list[look.observation].points) {
-    if (is_inside(object.box, config.icp_max_distance_m, p.point_W)) around.points.push_back(p);
+    if (!is_inside(object.box, config.icp_max_distance_m, p.point_W)) continue;
+    const bool of_another = std::any_of(looks, looks + count, [&](const Look& other) {
+      return other.object != &object && other.verdict == Verdict::kInPlace && !other.contested &&
+             other.object->arrival != Arrival::kArrived &&
+             is_inside(other.object->box, spacing_m, p.point_W) &&
+             other.object->model.nearest(p.point_W, static_cast<float>(1.5 * spacing_m)) !=
+                 ObjectModel::kNone;
+    });
+    if (!of_another) around.points.push_back(p);
   }
   if (around.points.size() < static_cast<std::size_t>(2 * kLeastPoints)) return;
   const Tally before = tally_of(look.sighting, observations, object.class_id, look.observation);
   // Its old place must be seen empty in part, and enough of it be seen to tell.
   const int told = before.here + before.through + before.covered;
-  if (before.through < kLeastPoints || told < config.min_visible_share * look.sighting.total) return;
+  if (told < config.min_visible_share * look.sighting.total) return;
 
   // A wall says nothing of how far it slid along itself: each end may be the one that is seen.
   const double yaw = object.box.pose.yaw_rad + (object.box.size_m.x() < object.box.size_m.y() ? M_PI_2 : 0.0);
@@ -182,6 +193,11 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     const Eigen::Vector3d& center_W = object.box.pose.position_W;
     if ((match->T_new_old * center_W - center_W).norm() > match->displacement_m + 2.0 * least_m)
       continue;
+    if (before.through < kLeastPoints) {
+      OrientedBox there_box = object.box;
+      there_box.pose.position_W = match->T_new_old * center_W;
+      if (box_overlap(there_box, object.box, 0.0) < kTakenShare) continue;
+    }
     std::vector<Surfel> moved = object.model.surfels();
     const Eigen::Isometry3f T = match->T_new_old.cast<float>();
     for (Surfel& s : moved) {

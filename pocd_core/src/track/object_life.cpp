@@ -276,7 +276,7 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
     standing.emplace(points, normals, config_.map.voxel_size_m, config_.map.truncation_m() * 2.0);
   const OrientedBox lost_box = box_of(lost);
   const double reach = 0.5 * lost_box.size_m.norm() + config_.map.truncation_m();
-  step.map.clear_object_where(object.id, [&](const Eigen::Vector3d& center_W) {
+  clear_gone(step, object.id, [&](const Eigen::Vector3d& center_W) {
     if ((center_W - lost_box.pose.position_W).norm() > reach) return false;
     const auto a = gone.nearest((center_W - gone.origin_W()).cast<float>());
     if (!a) return false;
@@ -300,6 +300,37 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
   object.reported_box = object.box;
   object.lost = 0;
   depart(step, std::move(departure), rule);
+}
+
+void ObjectTracker::clear_gone(Step& step, ObjectId id,
+                               const std::function<bool(const Eigen::Vector3d&)>& inside) {
+  const OrganizedCloud& cloud = step.cloud;
+  const Pose T_C_W = cloud.T_W_C.inverse();
+  const double near_m = 2.0 * config_.map.voxel_size_m;
+  const auto measured_now = [&](const Eigen::Vector3d& center_W) {
+    const Eigen::Vector3d p = T_C_W * center_W;
+    if (p.z() < near_m) return false;
+    const int col = static_cast<int>(cloud.camera.fx * p.x() / p.z() + cloud.camera.cx + 0.5);
+    const int row = static_cast<int>(cloud.camera.fy * p.y() / p.z() + cloud.camera.cy + 0.5);
+    if (col < 0 || row < 0 || col >= cloud.width || row >= cloud.height) return false;
+    return std::abs(cloud.depth_m[static_cast<std::size_t>(row) * cloud.width + col] - p.z()) <
+           near_m;
+  };
+  std::vector<const LibraryObject*> others;
+  if (const LibraryObject* object = library_.find(id)) {
+    for (const ObjectId other :
+         library_.near(object->box.pose.position_W, 0.5 * object->box.size_m.norm())) {
+      if (other != id) others.push_back(library_.find(other));
+    }
+  }
+  step.map.clear_object_where(id, [&](const Eigen::Vector3d& center_W) {
+    if (!inside(center_W) || measured_now(center_W)) return false;
+    return std::none_of(others.begin(), others.end(), [&](const LibraryObject* other) {
+      return is_inside(other->box, near_m, center_W.cast<float>()) &&
+             other->model.nearest(center_W.cast<float>(), static_cast<float>(near_m)) !=
+                 ObjectModel::kNone;
+    });
+  });
 }
 
 void ObjectTracker::remove_objects(Step& step) {
@@ -367,7 +398,7 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string&
   departure.seen_by = object.seen_by;
   departure.evidence = evidence_of(step, object);
   const bool was_known = object.confirmed;
-  step.map.clear_object(object.id);
+  clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
   std::replace(step.owners.begin(), step.owners.end(), object.id, ObjectId::kNone);
   for (std::size_t n = 0; n < step.look_count; ++n) {
     if (looks_[n].object == &object) looks_[n].sighting.sights.clear();

@@ -77,7 +77,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                            TsdfMap& map, std::vector<std::uint32_t>& owner_of_pixel,
                            FrameResult& result) {
   Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}};
-  step.sight = {(getenv("M") ? atof(getenv("M")) : 1.0) * config_.map.voxel_size_m, config_.change.pose_tolerance_m,
+  step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m,
                 config_.map.max_depth_m};
   look_at_objects(step);
   update_beliefs(step);
@@ -118,11 +118,19 @@ void ObjectTracker::look_at_objects(Step& step) {
           config_.association, look);
     const Sighting& s = look.sighting;
     if (s.hit + s.seen_through + s.occluded + s.unknown == 0) continue;
-    if (look.object->confirmed) {
-      align(step.cloud, step.field, step.observations, step.sight, config_.depth_noise,
-            config_.association, kNoiseShare * step.sight.margin_m, look);
-    }
     ++step.look_count;
+  }
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (!looks_[n].object->confirmed) continue;
+    align(step.cloud, step.field, step.observations, step.sight, config_.depth_noise,
+          config_.association, kNoiseShare * step.sight.margin_m, looks_.data(), step.look_count,
+          looks_[n]);
+  }
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    const Look& look = looks_[n];
+    const Sighting& s = look.sighting;
+    if (getenv("DBG") && std::abs(look.object->box.pose.position_W.x()-atof(getenv("DX")))<0.7 && std::abs(look.object->box.pose.position_W.y()-atof(getenv("DY")))<0.7)
+      fprintf(stderr,"%.2f #%u %s hit %d thr %d occ %d unk %d tot %d contested %d fits %d verdict %s disp %.3f E %.2f arr %s\n",(step.frame.stamp_ns/1e9-1000),to_index(look.object->id),look.object->confirmed?"C":"t",s.hit,s.seen_through,s.occluded,s.unknown,s.total,look.contested,look.fits,to_string(look.verdict),look.displacement_m,look.object->belief.stationarity(),to_string(look.object->arrival));
   }
   PartsConfig parts;
   parts.spacing_m = config_.map.voxel_size_m;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -72,6 +72,10 @@ class ObjectTracker {
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
                  const std::string& rule);
+  /// Clears the object's voxels where `inside` says so, but for those at which this frame or another
+  /// object has a surface.
+  void clear_gone(Step& step, ObjectId id,
+                  const std::function<bool(const Eigen::Vector3d&)>& inside);
   void remove(Step& step, LibraryObject& object, const std::string& rule);
   /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
   void depart(Step& step, Departure departure, const std::string& rule);
