@@ -139,7 +139,8 @@ void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_
         break;
       case Sight::kOccluded:
         ++out.occluded;
-        touch(out.touches, observations.observation_of[pixel], false);
+        if (difference > -static_cast<float>(config.cover_m))
+          touch(out.touches, observations.observation_of[pixel], false);
         break;
       case Sight::kUnknown:
         ++out.unknown;

@@ -23,8 +23,12 @@ constexpr double kTakenShare = 0.5;
 constexpr std::size_t kFitBudget = 200;
 /// Points of a surface lie within so many spacings of a surfel, beside their noise.
 constexpr double kFitSpacings = 0.75;
-/// The surface at its new place explains the frame when no more than this share contradicts it.
+/// The surface at its new place explains the frame when no more than this share of it is seen through,
+/// and it is measured in at least so many points as this share of what was measured there.
 constexpr double kLeftOverShare = 0.15;
+constexpr double kExplainedShare = 0.6;
+/// At most this share of what was measured may lie on sides that were not known.
+constexpr double kUnseenShare = 0.35;
 /// A new object's first surfels were measured once; later ones bear witness after the second time.
 constexpr std::uint32_t kYoungObservations = 2;
 
@@ -180,13 +184,16 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     low = std::min(low, at), high = std::max(high, at);
   }
   const double half = 0.5 * object.box.size_m.head<2>().maxCoeff();
-  double best_share = kLeftOverShare;
+  // Sides that were never seen before lie off the known surface.
+  AssociationConfig loose = config;
+  loose.max_dissimilarity = kUnseenShare;
+  int most = 0;
   for (const double slid_m : {0.0, high - half, low + half}) {
     if (slid_m != 0.0 && (std::abs(slid_m) < least_m || std::abs(slid_m) > config.max_distance_m))
       continue;
     Pose start = Pose::Identity();
     start.translation() = -slid_m * along_W;
-    const auto match = align_in_place(object, around, cloud.T_W_C, start, config);
+    const auto match = align_in_place(object, around, cloud.T_W_C, start, loose);
     if (!match || match->displacement_m < least_m || match->displacement_m > config.max_distance_m)
       continue;
     // An edge that fits says nothing of where the rest went.
@@ -208,11 +215,12 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     sight_object(moved, object.class_id, min_hits(object), cloud, field, observations, sight, noise,
                  there);
     const Tally after = tally_of(there, observations, object.class_id, look.observation);
-    if (after.contested_share() > best_share || after.here < before.here ||
-        after.here < 2 * kLeastPoints) {
+    if (after.through > kLeftOverShare * (after.here + after.through) || after.here < before.here ||
+        after.here < kExplainedShare * static_cast<double>(around.points.size()) ||
+        after.here - after.through <= most) {
       continue;
     }
-    best_share = after.contested_share();
+    most = after.here - after.through;
     look.verdict = Verdict::kDisplaced;
     look.T_new_old = match->T_new_old;
     look.displacement_m = match->displacement_m;

@@ -78,7 +78,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                            FrameResult& result) {
   Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}};
   step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m,
-                config_.map.max_depth_m};
+                config_.map.max_depth_m, config_.association.icp_max_distance_m};
   look_at_objects(step);
   update_beliefs(step);
   fuse_parts(step);
@@ -245,7 +245,8 @@ void ObjectTracker::fuse_parts(Step& step) {
     Part& part = step.parts[p];
     LibraryObject* object = part.look ? part.look->object : nullptr;
     if (!object) object = &create(step, step.observations.list[part.observation].class_id);
-    fuse(step, *object, part.points);
+    // On a contested surface what was measured may be another place of it.
+    if (!part.look || !part.look->contested) fuse(step, *object, part.points);
     step.owners[p] = object->id;
     if (std::find(seen.begin(), seen.end(), object) == seen.end()) seen.push_back(object);
   }
