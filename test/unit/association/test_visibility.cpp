@@ -187,7 +187,7 @@ TEST(Visibility, NeedsNoReturnWithinTheDepthLimit) {
   DepthField field;
   field.update(s.cloud);
   Sighting out;
-  sight_object(front_of_the_box(), kBoxClass, 2, s.cloud, field, s.observations, {0.1, 0.03, 3.0},
+  sight_object(front_of_the_box().surfels(), kBoxClass, 2, s.cloud, field, s.observations, {0.1, 0.03, 3.0},
                pipeline.depth_noise, out);
   EXPECT_GT(out.seen_through, 0.8 * out.total);
 }
