@@ -16,7 +16,7 @@ std::uint64_t random_epoch() {
 
 /// The group of the configuration that pocd_parameters does not know.
 struct NodeGroup {
-  pocd::dds::NodeConfig node;
+  pocd::NodeConfig node;
 
   template <class Visitor>
   void describe(Visitor& visit) {

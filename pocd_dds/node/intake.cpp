@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "pocd/common/check.hpp"
+#include "pocd/input/robot_topic.hpp"
+#include "pocd_dds/node/input_delivery.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -26,20 +28,23 @@ StampNs wall_clock_ns() {
 }  // namespace
 
 Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-               const ClassMap& classes, BusWatch& watch, FrameQueue& queue, LatencyLog& latency)
+               const PipelineConfig& pipeline, BusWatch& watch, FrameQueue& queue,
+               LatencyLog& latency)
     : participant_(participant),
       node_(node),
       watch_(watch),
       queue_(queue),
       latency_(latency),
-      colours_(classes),
+      labels_(pipeline.classes),
       topics_(node),
       roster_(node),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
       tf_(node.topics.own_tf()
               ? nullptr
-              : std::make_unique<TransformInput>(participant, node.topics.tf, node.topics.tf_static,
-                                                 node.lossless, wakeup_)),
+              : std::make_unique<TransformInput>(participant, bus_name(node.topics.tf),
+                                                 bus_name(node.topics.tf_static), node.lossless,
+                                                 wakeup_)),
+      context_{node_, labels_, pipeline.map.max_depth_m, transforms_, problems_},
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
   for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
   update_status();
@@ -75,8 +80,8 @@ void Intake::run() {
 void Intake::meet(const std::string& name, const RobotConfig& config, bool named) {
   Robot& robot = robots_[name];
   robot.named = named;
-  robot.input = std::make_unique<RobotInput>(participant_, node_, config, colours_, transforms_,
-                                             problems_, wakeup_, latency_);
+  robot.input = std::make_unique<RobotInput>(participant_, node_, config, context_, problems_,
+                                             wakeup_, latency_);
 }
 
 void Intake::follow_roster() {
@@ -91,11 +96,19 @@ void Intake::follow_roster() {
 // Fast DDS keeps quiet about it: a writer of another type just never matches.
 void Intake::check_type(const BusEvent& event) {
   if (event.kind != BusEvent::Kind::kEndpoint || !event.endpoint.writer) return;
-  const TopicSpec* expected = topics_.spec_of(event.endpoint.topic);
-  if (expected == nullptr || event.endpoint.type == expected->type) return;
-  problems_.count(event.endpoint.topic,
-                  {InputReason::kWrongType,
-                   "announced with type " + event.endpoint.type + ", expected " + expected->type});
+  const BusEndpoint& endpoint = event.endpoint;
+  for (const InputTopic& to : topics_.find(endpoint.topic)) {
+    const TopicSpec expected = spec_of(to.stream, endpoint.topic);
+    if (endpoint.type == expected.type) continue;
+    const bool compressed = is_image(to.stream) && endpoint.type == topics::kCompressedImageType;
+    problems_.count(endpoint.topic,
+                    {InputReason::kWrongType,
+                     "has type " + endpoint.type + ", expected " + expected.type +
+                         (compressed ? "; the name of a compressed topic has to end in /compressed "
+                                       "or /compressedDepth"
+                                     : "")});
+    return;
+  }
 }
 
 void Intake::follow(const std::vector<RosterChange>& changes) {
@@ -104,7 +117,7 @@ void Intake::follow(const std::vector<RosterChange>& changes) {
       go(change);
     } else if (robots_.count(change.robot) == 0 && robots_.size() >= kMostRobots) {
       turned_away_.insert(change.robot);
-      problems_.count(robot_topic(node_.topics.depth, change.robot), "too_many_robots",
+      problems_.count(bus_name(robot_topic(node_.topics.depth, change.robot)), "too_many_robots",
                       "there are " + std::to_string(kMostRobots) + " already: not listened to", 1);
     } else {
       come(change.robot);
@@ -131,7 +144,7 @@ void Intake::come(const std::string& name) {
       meet(name, config, false);
     } catch (const InputError& error) {
       robots_.erase(name);
-      problems_.count(robot_topic(node_.topics.depth, name), "no_reader", error.what(), 1);
+      problems_.count(bus_name(robot_topic(node_.topics.depth, name)), "no_reader", error.what(), 1);
       return;
     }
   }
@@ -222,7 +235,7 @@ void Intake::update_status() {
       waiting = "the other robots wait for its next frame";
     }
     status.robots.push_back({name, input.live(), input.frames(), input.dropped(), input.lost(),
-                             std::move(waiting), input.images()});
+                             std::move(waiting), input.images(), input.rate_limited()});
   }
   status.departures.assign(departures_.begin(), departures_.end());
   status.problems = problems_.entries();

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "pocd/input/frame_merger.hpp"
+#include "pocd/input/input_topics.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/frame_queue.hpp"
-#include "pocd_dds/node/input_topics.hpp"
 #include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/robot_input.hpp"
 #include "pocd_dds/node/roster.hpp"
@@ -29,6 +29,7 @@ struct RobotStatus {
   std::uint64_t frames = 0, dropped = 0, lost = 0;
   std::string waiting_for;   ///< "" or what its frames wait for, or why it is not waited for
   std::uint64_t images = 0;  ///< depth images that came
+  std::uint64_t rate_limited = 0;  ///< of them, beyond node.max_frame_rate_hz
 };
 
 /// A robot that has gone, and why.
@@ -53,7 +54,7 @@ class Intake {
   /// `watch` has listened on the participant from its first moment. It, `queue` and `latency` must
   /// outlive the intake. Throws InputError for a bad topic or colour.
   Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-         const ClassMap& classes, BusWatch& watch, FrameQueue& queue, LatencyLog& latency);
+         const PipelineConfig& pipeline, BusWatch& watch, FrameQueue& queue, LatencyLog& latency);
   ~Intake();
 
   /// Takes what has arrived until now, hands every frame that it makes to the queue, and closes it.
@@ -96,12 +97,13 @@ class Intake {
   FrameQueue& queue_;
   LatencyLog& latency_;
   Wakeup wakeup_;
-  ColourTable colours_;
+  const LabelTable labels_;
   ProblemCounter problems_;
   const InputTopics topics_;
   Roster roster_;
   TransformTree transforms_;            ///< of the topics that all robots share
   std::unique_ptr<TransformInput> tf_;  ///< null when every robot has its own
+  const StreamContext context_;
   std::map<std::string, Robot> robots_;
   std::set<std::string> turned_away_;  ///< on the bus, but there was no room
   std::deque<RobotDeparture> departures_;

@@ -13,7 +13,7 @@
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/byte_budget.hpp"
-#include "pocd_dds/node/node_config.hpp"
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/node/status_publication.hpp"
 #include "pocd_msgsPubSubTypes.h"
 

@@ -50,7 +50,7 @@ struct Node::Impl {
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
-        intake(participant, config.node, config.pipeline.classes, watch, queue, latency),
+        intake(participant, config.node, config.pipeline, watch, queue, latency),
         worker([this] { guard([this] { work(); }); }),
         drawer([this] { guard([this] { draw(); }); }) {}
 

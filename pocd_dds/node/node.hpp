@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "pocd_dds/node/node_config.hpp"
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/node/status_publication.hpp"
 
 namespace pocd::dds {

@@ -8,7 +8,7 @@
 
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
-#include "pocd_dds/node/node_config.hpp"
+#include "pocd/config/node_config.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
 namespace pocd::dds {

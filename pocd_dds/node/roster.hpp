@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pocd_dds/entities/bus_watch.hpp"
-#include "pocd_dds/node/node_config.hpp"
+#include "pocd/config/node_config.hpp"
 
 namespace pocd::dds {
 

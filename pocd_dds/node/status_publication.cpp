@@ -126,6 +126,9 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     add(status, "frames", std::to_string(robot.frames));
     add(status, "frames dropped as incomplete", std::to_string(robot.dropped));
     add(status, "images lost on the bus", std::to_string(robot.lost));
+    if (robot.rate_limited > 0) {
+      add(status, "images beyond node.max_frame_rate_hz", std::to_string(robot.rate_limited));
+    }
     diagnostics.status().push_back(status);
   }
   for (const RobotDeparture& departure : intake.departures) {

@@ -51,6 +51,9 @@ recording::Bytes instance_payload(InstanceChange change, const InstanceKey& key)
 /// Throws DamagedData.
 std::pair<InstanceChange, InstanceKey> parse_instance(const std::uint8_t* data, std::size_t size);
 
+/// ROS 2's own bookkeeping and services: played again, they would make nodes that are not there.
+bool is_of_the_ros_graph(const std::string& dds_topic);
+
 /// Shell pattern (*, ?, [..]) against the recorded name or the name on the bus.
 bool topic_matches(const std::string& pattern, const RecordedTopic& topic);
 

@@ -69,7 +69,7 @@ DriveLoad drive_load(Site& site, double map_period_s, double object_period_s) {
   return load;
 }
 
-SitePublisher::SitePublisher(Site& site, const dds::NodeFile& config, const dds::BusOptions& bus)
+SitePublisher::SitePublisher(Site& site, const NodeFile& config, const dds::BusOptions& bus)
     : site_(site),
       config_(config),
       participant_(std::make_shared<dds::Participant>(bus)),

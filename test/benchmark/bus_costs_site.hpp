@@ -33,7 +33,7 @@ DriveLoad drive_load(Site& site, double map_period_s, double object_period_s);
 /// thread that writes what is new, one that sends, and one for the topics of ROS 2 tools.
 class SitePublisher {
  public:
-  SitePublisher(Site& site, const dds::NodeFile& config, const dds::BusOptions& bus);
+  SitePublisher(Site& site, const NodeFile& config, const dds::BusOptions& bus);
 
   /// Map and objects as they are, for those who come.
   void publish_all();
@@ -53,7 +53,7 @@ class SitePublisher {
   void send_status(int robots);
 
   Site& site_;
-  const dds::NodeFile config_;
+  const NodeFile config_;
   std::shared_ptr<dds::Participant> participant_;
   dds::Wakeup wakeup_;
   std::mutex mutex_;  // what both threads use

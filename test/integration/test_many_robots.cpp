@@ -17,11 +17,11 @@ TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
   dds::BusWatch watch;
   dds::BusOptions options{domain.number(), "", "intake"};
   options.listener = &watch;
-  dds::NodeConfig config;
+  NodeConfig config;
   config.segmentation = "absent";
   dds::FrameQueue queue(1);
   dds::LatencyLog latency("");
-  dds::Intake intake(std::make_shared<dds::Participant>(options), config, ClassMap{}, watch, queue,
+  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch, queue,
                      latency);
   const auto names = [&] {
     std::set<std::string> present;

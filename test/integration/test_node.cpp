@@ -35,7 +35,7 @@ TEST(Node, UsageErrorsNameWhatIsWrongAndExitCodeIs2) {
        "queue_frames: 0 is out of range"},
       {{"--config", config, "--robot", "r", "--robot", "r"}, "the name r is used twice"},
       {{"--config", config, "--robot", "r 1"}, "\"r 1\" has a blank"},
-      {{"--config", config, "--set", "node.topics.odometry=/{robot}/odom"}, "\"rt/{robot}/odom\""},
+      {{"--config", config, "--set", "node.topics.odometry=rt/{robot}/o dom"}, "has a blank in it"},
       {{"--config", config, "--robot", "r", "--domain", "500"}, "--domain"},
       {{"--nonsense"}, "--nonsense"}};
   for (auto [arguments, named] : cases) {

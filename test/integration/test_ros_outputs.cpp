@@ -188,7 +188,7 @@ TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
 
 /// The outputs alone, in a time that the test makes.
 struct OutputsInSimulatedTime {
-  explicit OutputsInSimulatedTime(const dds::RosOutputConfig& rates,
+  explicit OutputsInSimulatedTime(const RosOutputConfig& rates,
                                   const std::string& profiles = "")
       : bus(std::make_shared<dds::Participant>(
             dds::BusOptions{domain.number(), profiles, "pocd_test"})),
@@ -207,8 +207,8 @@ struct OutputsInSimulatedTime {
     objects.erase(static_cast<ObjectId>(id));
     touched.insert(static_cast<ObjectId>(id));
   }
-  static dds::NodeFile config(const dds::RosOutputConfig& rates) {
-    dds::NodeFile file;
+  static NodeFile config(const RosOutputConfig& rates) {
+    NodeFile file;
     file.node.outputs = rates;
     return file;
   }
@@ -225,7 +225,7 @@ struct OutputsInSimulatedTime {
 // As Open-RMF's obstacle manager does it: an obstacle is there until it is deleted or its lifetime
 // since the last message about it is over.
 TEST(RosOutputs, ObstaclesAreRefreshedInTimeAndGoByDeleteAndByLapse) {
-  dds::RosOutputConfig rates;
+  RosOutputConfig rates;
   rates.obstacles_hz = 2.0;
   rates.markers_hz = 5.0;
   rates.occupancy_hz = rates.surface_hz = 0.0;
@@ -325,7 +325,7 @@ TEST(RosOutputs, WhatIsRefusedIsSentAgain) {
     }
     file << "</profiles>";
   }
-  dds::RosOutputConfig rates;
+  RosOutputConfig rates;
   rates.markers_hz = rates.occupancy_hz = 1.0;
   rates.obstacles_hz = rates.surface_hz = 0.0;
   OutputsInSimulatedTime node(rates, profiles.string());
@@ -360,7 +360,7 @@ TEST(RosOutputs, WhatIsRefusedIsSentAgain) {
 
   std::vector<MapTile> tiles;
   for (const auto& entry : publisher.tiles()) tiles.push_back(entry.second);
-  const dds::NodeFile config = OutputsInSimulatedTime::config(rates);
+  const NodeFile config = OutputsInSimulatedTime::config(rates);
   dds::OccupancyProjection projection(
       {config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m(),
        config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m});

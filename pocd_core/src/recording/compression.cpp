@@ -5,6 +5,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <memory>
 
@@ -143,6 +144,19 @@ Bytes decompress(const std::string& compression, const std::uint8_t* data, std::
                              std::to_string(out_size) + " are announced");
   }
   return Bytes(data, data + size);
+}
+
+bool is_zstd(const std::uint8_t* data, std::size_t size) {
+  constexpr std::uint8_t kMagic[] = {0x28, 0xB5, 0x2F, 0xFD};
+  return size >= sizeof kMagic && std::equal(std::begin(kMagic), std::end(kMagic), data);
+}
+
+Bytes decompress_message(const std::uint8_t* data, std::size_t size, std::size_t most) {
+  const unsigned long long content = ZSTD_getFrameContentSize(data, size);
+  if (content == ZSTD_CONTENTSIZE_UNKNOWN || content == ZSTD_CONTENTSIZE_ERROR || content > most) {
+    throw DamagedData(0, "zstd: the message does not say its size, or is too large");
+  }
+  return decompress_zstd(data, size, static_cast<std::size_t>(content));
 }
 
 }  // namespace pocd::recording

@@ -25,6 +25,7 @@ struct TransformLookup {
   PoseLookup result = PoseLookup::kEmpty;
   Pose T_target_source = Pose::Identity();
   std::string edge;
+  StampNs off_ns = 0;  ///< of kTooNew and kTooOld: how far the stamp lies beyond the poses
 };
 
 /// Every frame has one parent. Not thread-safe.
@@ -48,6 +49,9 @@ class TransformTree {
   void forget_moving();
   /// Forgets what is not static at these frames and at all that hang on them.
   void forget_moving(const std::vector<std::string>& frames);
+
+  /// Whether something says where the frame is.
+  bool knows(const std::string& frame) const { return find(frame) != nullptr; }
 
   /// The frames from `source` up to the one before `target`, as far as they are known.
   std::vector<std::string> chain(const std::string& target, const std::string& source) const;
