@@ -1,4 +1,5 @@
-// sensor_msgs/Image and CompressedImage for a subscriber that converts it where it lies, in the middleware's memory.
+// sensor_msgs/Image and CompressedImage for a subscriber that converts it where it lies, in the
+// middleware's memory.
 #pragma once
 
 #include <exception>

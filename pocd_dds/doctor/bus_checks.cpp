@@ -21,10 +21,10 @@ Severity severity_of(const std::string& use) {
 }
 
 std::vector<Expected> expected_of(const NodeConfig& node) {
-  std::vector<Expected> list{{InputStream::kDepth, Severity::kError,
-                              "no depth images: the robot is not there"},
-                             {InputStream::kCameraInfo, Severity::kError,
-                              "no intrinsics: none of its images can be used"}};
+  std::vector<Expected> list{
+      {InputStream::kDepth, Severity::kError, "no depth images: the robot is not there"},
+      {InputStream::kCameraInfo, Severity::kError,
+       "no intrinsics: none of its images can be used"}};
   if (node.segmentation != "absent") {
     list.push_back({InputStream::kSegmentation, severity_of(node.segmentation), "no segmentation"});
   }
@@ -45,7 +45,8 @@ std::string advice_for(const BusPicture& bus, const std::string& topic, InputStr
   if (topic.compare(0, 3, "rt/") == 0) {
     for (const std::string& bare : {topic.substr(3), topic.substr(2)}) {
       if (bus.endpoints(bare, true).empty()) continue;
-      return "there is " + bare + ", without rt/, which ROS 2 puts before its names: give that name "
+      return "there is " + bare +
+             ", without rt/, which ROS 2 puts before its names: give that name "
              "to the topic in the group `node`, or announce it as ROS 2 does";
     }
   }
@@ -64,10 +65,11 @@ void check_writers(const std::vector<BusEndpoint>& writers, const std::string& t
                           "has type " + writer.type + ", expected " + spec.type,
                           "correct the sender, or the topic in the group `node.topics`"});
     } else if (!writer.partitions.empty()) {
-      findings.push_back({Severity::kError, topic,
-                          "is in the partition " + joined(writer.partitions) +
-                              ": not heard, the component is in none",
-                          "take the sender out of its partition, or put both into one by a profile"});
+      findings.push_back(
+          {Severity::kError, topic,
+           "is in the partition " + joined(writer.partitions) +
+               ": not heard, the component is in none",
+           "take the sender out of its partition, or put both into one by a profile"});
     } else if (writer.keyed != spec.keyed) {
       findings.push_back({Severity::kError, topic, "is keyed: keyed and unkeyed do not match",
                           "announce it as ROS 2 does"});
@@ -121,7 +123,8 @@ void find_bare_robots(const BusPicture& bus, const std::string& pattern, Finding
 std::string advice_for(const std::string& reason) {
   const auto is = [&](InputReason known) { return reason == to_string(known); };
   if (is(InputReason::kNoMask)) {
-    return "send masks with the stamps of their depth images, raise node.stamp_tolerance_s, or leave "
+    return "send masks with the stamps of their depth images, raise node.stamp_tolerance_s, or "
+           "leave "
            "such frames out (node.segmentation: required)";
   }
   if (is(InputReason::kUnlistedClass)) return "complete classes.list, or correct the network's ids";

@@ -50,8 +50,8 @@ inline constexpr TopicSpec kColor{input_names::kColor, "sensor_msgs::msg::dds_::
                                   Direction::kIn, false, best_effort(5)};
 inline constexpr TopicSpec kOdometry{input_names::kOdometry, "nav_msgs::msg::dds_::Odometry_",
                                      Direction::kIn, false, best_effort(20)};
-inline constexpr TopicSpec kTf{input_names::kTf, "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn, false,
-                               best_effort(100)};
+inline constexpr TopicSpec kTf{input_names::kTf, "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn,
+                               false, best_effort(100)};
 inline constexpr TopicSpec kTfStatic{input_names::kTfStatic, "tf2_msgs::msg::dds_::TFMessage_",
                                      Direction::kIn, false, latched(100)};
 inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kBoth,

@@ -39,11 +39,10 @@ Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig
       topics_(node),
       roster_(node),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
-      tf_(node.topics.own_tf()
-              ? nullptr
-              : std::make_unique<TransformInput>(participant, bus_name(node.topics.tf),
-                                                 bus_name(node.topics.tf_static), node.lossless,
-                                                 wakeup_)),
+      tf_(node.topics.own_tf() ? nullptr
+                               : std::make_unique<TransformInput>(
+                                     participant, bus_name(node.topics.tf),
+                                     bus_name(node.topics.tf_static), node.lossless, wakeup_)),
       context_{node_, labels_, pipeline.map.max_depth_m, transforms_, problems_},
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
   for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
@@ -144,7 +143,8 @@ void Intake::come(const std::string& name) {
       meet(name, config, false);
     } catch (const InputError& error) {
       robots_.erase(name);
-      problems_.count(bus_name(robot_topic(node_.topics.depth, name)), "no_reader", error.what(), 1);
+      problems_.count(bus_name(robot_topic(node_.topics.depth, name)), "no_reader", error.what(),
+                      1);
       return;
     }
   }

@@ -27,8 +27,8 @@ struct RobotStatus {
   std::string name;
   bool live = false;
   std::uint64_t frames = 0, dropped = 0, lost = 0;
-  std::string waiting_for;   ///< "" or what its frames wait for, or why it is not waited for
-  std::uint64_t images = 0;  ///< depth images that came
+  std::string waiting_for;         ///< "" or what its frames wait for, or why it is not waited for
+  std::uint64_t images = 0;        ///< depth images that came
   std::uint64_t rate_limited = 0;  ///< of them, beyond node.max_frame_rate_hz
 };
 

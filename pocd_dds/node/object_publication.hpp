@@ -6,9 +6,9 @@
 #include <memory>
 #include <set>
 
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
-#include "pocd/config/node_config.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
 namespace pocd::dds {

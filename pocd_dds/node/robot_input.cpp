@@ -61,8 +61,8 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
       camera_info_(participant, topics::kCameraInfo, streams_.topic(InputStream::kCameraInfo),
                    input_delivery(topics::kCameraInfo, node.lossless), wakeup) {
   const auto image_reader = [&](InputStream stream) {
-    return std::make_unique<ImageReader>(participant, stream, streams_.topic(stream),
-                                         node.lossless, wakeup);
+    return std::make_unique<ImageReader>(participant, stream, streams_.topic(stream), node.lossless,
+                                         wakeup);
   };
   if (node.segmentation != "absent") segmentation_ = image_reader(InputStream::kSegmentation);
   if (node.color != "absent") color_ = image_reader(InputStream::kColor);
@@ -134,8 +134,7 @@ void RobotInput::drain_images(Stream stream, ImageReader& reader) {
   // goes on to send.
   const std::size_t most = ending() ? std::max(kMostImages, reader.unread()) : kMostImages;
   for (std::size_t i = 0; i < most; ++i) {
-    const bool enough =
-        stream == Stream::kDepth && streams_.synchronizer().pending() >= kHoldDepth;
+    const bool enough = stream == Stream::kDepth && streams_.synchronizer().pending() >= kHoldDepth;
     if (lossless_ && enough && !ending()) return;
     const double before_ms = thread_cpu_ms();
     const bool taken = reader.take(visit, meta);
@@ -154,10 +153,11 @@ void RobotInput::drain_images(Stream stream, ImageReader& reader) {
 void RobotInput::count_lost(Stream stream, const ImageReader& reader) {
   std::uint64_t& told = told_lost_[stream];
   const std::uint64_t lost = reader.lost();
-  problems_.count(reader.topic(), "images_lost",
-                  "images did not arrive whole, or found no room: net.core.rmem_max, the buffers in "
-                  "the profile, a busy machine",
-                  lost - told);
+  problems_.count(
+      reader.topic(), "images_lost",
+      "images did not arrive whole, or found no room: net.core.rmem_max, the buffers in "
+      "the profile, a busy machine",
+      lost - told);
   told = lost;
 }
 
@@ -178,11 +178,12 @@ void RobotInput::judge_silence() {
   const auto since = std::max(moved_on_, heard_[*blocker]);
   if (!lossless_ || given_up_ || seconds(now - since) < silent_wait_s_) return;
   given_up_ = blocker;
-  problems_.count(streams_.topic(*blocker),
-                  {InputReason::kSilentStream,
-                   "nothing came for " + whole_seconds(silent_wait_s_) + " while " +
-                       std::to_string(streams_.synchronizer().pending()) + " depth images of " + name() +
-                       " were " + streams_.synchronizer().waiting_for() + ": not waited for until it comes"});
+  problems_.count(
+      streams_.topic(*blocker),
+      {InputReason::kSilentStream,
+       "nothing came for " + whole_seconds(silent_wait_s_) + " while " +
+           std::to_string(streams_.synchronizer().pending()) + " depth images of " + name() +
+           " were " + streams_.synchronizer().waiting_for() + ": not waited for until it comes"});
 }
 
 double RobotInput::silent_s() const {

@@ -36,8 +36,8 @@ class RobotInput {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// What `context` refers to, `problems` (the same counter), `wakeup` and `latency` must outlive it.
-  /// Throws InputError naming the topic when there can be no reader.
+  /// What `context` refers to, `problems` (the same counter), `wakeup` and `latency` must outlive
+  /// it. Throws InputError naming the topic when there can be no reader.
   RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
              const RobotConfig& robot, const StreamContext& context, ProblemCounter& problems,
              Wakeup& wakeup, LatencyLog& latency);

@@ -10,10 +10,10 @@
 
 #include "map_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/bridge/ros_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/node_clock.hpp"
-#include "pocd/config/node_config.hpp"
 #include "rmf_obstacle_msgsPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"

@@ -18,7 +18,8 @@ std::string lease_text(double lease_s) {
 
 }  // namespace
 
-Roster::Roster(const NodeConfig& node) : discovers_(node.discovers()), pattern_(bus_name(node.topics.depth)) {
+Roster::Roster(const NodeConfig& node)
+    : discovers_(node.discovers()), pattern_(bus_name(node.topics.depth)) {
   for (const RobotConfig& robot : node.robots) {
     named_[topic_of(node, robot, InputStream::kDepth)] = robot.name;
     names_.insert(robot.name);

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd/config/node_config.hpp"
+#include "pocd_dds/entities/bus_watch.hpp"
 
 namespace pocd::dds {
 

@@ -82,8 +82,8 @@ void read_qos(const RecordedChannel& channel, RecordedTopic& topic) {
   const auto best_effort = [](const std::string& value) {
     return value == "2" || value == "best_effort";
   };
-  topic.reliable = reliability.empty() ||
-                   !std::all_of(reliability.begin(), reliability.end(), best_effort);
+  topic.reliable =
+      reliability.empty() || !std::all_of(reliability.begin(), reliability.end(), best_effort);
   topic.transient_local = durability.empty() ? is_latched_by_custom(channel.topic)
                                              : any_is(durability, "1", "transient_local");
 }

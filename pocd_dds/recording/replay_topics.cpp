@@ -30,9 +30,9 @@ void ReplayTopics::refuse_typos() const {
   }
   for (const auto* patterns : {&options_.latch, &options_.no_latch}) {
     for (const std::string& pattern : *patterns) {
-      const bool known =
-          std::any_of(played_.begin(), played_.end(),
-                      [&](const auto& entry) { return topic_matches(pattern, entry.second); });
+      const bool known = std::any_of(played_.begin(), played_.end(), [&](const auto& entry) {
+        return topic_matches(pattern, entry.second);
+      });
       if (known) continue;
       throw InputError((patterns == &options_.latch ? "--latch " : "--no-latch ") + pattern +
                        ": matches no topic that is played, only " + names(played_, of_entry));

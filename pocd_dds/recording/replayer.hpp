@@ -21,7 +21,7 @@ struct ReplayOptions {
   std::vector<std::string> topics;            ///< patterns; empty: all
   /// Patterns of topics that are played latched (transient local), or not, whatever was recorded.
   std::vector<std::string> latch, no_latch;
-  std::map<std::string, std::string> remap;   ///< recorded name -> name, both as recorded
+  std::map<std::string, std::string> remap;  ///< recorded name -> name, both as recorded
   /// Multiple of the original speed; nothing: as fast as possible.
   std::optional<double> speed = 1.0;
   /// Every reader has a sample before the next one of its topic is sent; best effort topics become

@@ -41,8 +41,7 @@ Checked<cv::Mat> depth_from(const sensor_msgs::msg::Image& message) {
 Checked<cv::Mat> color_from(const sensor_msgs::msg::Image& message) {
   return visited(message, color_image);
 }
-Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& message,
-                                const LabelTable& colours) {
+Checked<LabelImage> labels_from(const sensor_msgs::msg::Image& message, const LabelTable& colours) {
   return visited(message, [&](const ImageView& view) { return label_image(view, colours); });
 }
 

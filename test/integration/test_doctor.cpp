@@ -114,12 +114,13 @@ TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
   const auto bus = test_participant(domain);
   using ImageWriter = dds::Writer<sensor_msgs::msg::ImagePubSubType>;
   ImageWriter bare(bus, dds::topics::kDepth, "robot1/depth/image_raw", kTestDelivery);
-  ImageWriter other(bus, dds::topics::kDepth, "rt/robot1/front/depth/image_rect_raw", kTestDelivery);
-  Process doctor(machine.command(domain, {"--listen", "600", "--verbose", "--robot", "robot1",
-                                          "--robot", "robot2"}));
-  const CommandResult result =
-      ask(doctor, [](StampNs) {}, {"robot1/depth/image_raw: is announced",
-                                   "rt/robot1/front/depth/image_rect_raw: is announced"});
+  ImageWriter other(bus, dds::topics::kDepth, "rt/robot1/front/depth/image_rect_raw",
+                    kTestDelivery);
+  Process doctor(machine.command(
+      domain, {"--listen", "600", "--verbose", "--robot", "robot1", "--robot", "robot2"}));
+  const CommandResult result = ask(doctor, [](StampNs) {},
+                                   {"robot1/depth/image_raw: is announced",
+                                    "rt/robot1/front/depth/image_rect_raw: is announced"});
   EXPECT_EQ(result.exit_code, 1);
   for (const char* part :
        {"there is robot1/depth/image_raw, without rt/",
@@ -139,10 +140,11 @@ TEST(Doctor, SuggestsAConfigurationThatFits) {
   // Discovery takes a moment: a longer look where the first one was too short.
   CommandResult result;
   EXPECT_TRUE(eventually([&] {
-    result = run_command({bin("pocd_doctor"), "--suggest", "--listen", "1", "--domain",
-                          domain.text()});
+    result =
+        run_command({bin("pocd_doctor"), "--suggest", "--listen", "1", "--domain", domain.text()});
     return result.exit_code == 0 && result.out.find("camera_info_topic") != std::string::npos;
-  })) << result.out << result.err;
+  })) << result.out
+      << result.err;
   const TemporaryFolder folder;
   write_file(folder.path() / "suggested.yaml", result.out);
   const CommandResult dump =

@@ -21,8 +21,8 @@ TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
   config.segmentation = "absent";
   dds::FrameQueue queue(1);
   dds::LatencyLog latency("");
-  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch, queue,
-                     latency);
+  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch,
+                     queue, latency);
   const auto names = [&] {
     std::set<std::string> present;
     for (const auto& robot : intake.status().robots) {

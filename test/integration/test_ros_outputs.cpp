@@ -188,8 +188,7 @@ TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
 
 /// The outputs alone, in a time that the test makes.
 struct OutputsInSimulatedTime {
-  explicit OutputsInSimulatedTime(const RosOutputConfig& rates,
-                                  const std::string& profiles = "")
+  explicit OutputsInSimulatedTime(const RosOutputConfig& rates, const std::string& profiles = "")
       : bus(std::make_shared<dds::Participant>(
             dds::BusOptions{domain.number(), profiles, "pocd_test"})),
         outputs(bus, config(rates), 1) {}

@@ -49,8 +49,8 @@ Size png_size(const Bytes& bytes) {
 Size jpeg_size(const Bytes& bytes) {
   for (std::size_t at = 2; at + 9 < bytes.size && bytes.data[at] == 0xFF;) {
     const std::uint8_t marker = bytes.data[at + 1];
-    const bool frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 &&
-                       marker != 0xCC;
+    const bool frame =
+        marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
     if (frame) return {big_endian(bytes.data + at + 7, 2), big_endian(bytes.data + at + 5, 2)};
     at += 2 + big_endian(bytes.data + at + 2, 2);
   }
@@ -64,8 +64,8 @@ Checked<Picture> decode(const ImageView& image, const Bytes& bytes) {
   const Size size = png ? png_size(bytes) : jpeg_size(bytes);
   if (size.width == 0 || size.height == 0) return damaged(image, "its size cannot be read");
   if (size.width > kLargestSide_px || size.height > kLargestSide_px) {
-    return {InputReason::kTooLarge, "image is " + std::to_string(size.width) + "x" +
-                                        std::to_string(size.height)};
+    return {InputReason::kTooLarge,
+            "image is " + std::to_string(size.width) + "x" + std::to_string(size.height)};
   }
   Picture picture;
   picture.lossy = !png;
@@ -99,7 +99,8 @@ class RvlReader {
       if (nibbles_ == 0) {
         if (bytes_.size - at_ < 4) return false;
         word_ = 0;
-        for (int i = 3; i >= 0; --i) word_ = word_ << 8 | bytes_.data[at_ + static_cast<std::size_t>(i)];
+        for (int i = 3; i >= 0; --i)
+          word_ = word_ << 8 | bytes_.data[at_ + static_cast<std::size_t>(i)];
         at_ += 4;
         nibbles_ = 8;
       }
@@ -146,8 +147,8 @@ Checked<cv::Mat> decode_rvl(const ImageView& image, const Bytes& bytes) {
     for (; values > 0; --values) {
       std::uint32_t difference = 0;
       if (!in.number(difference)) return damaged(image, "its RVL data is damaged");
-      value += static_cast<std::int32_t>(difference >> 1) ^
-               -static_cast<std::int32_t>(difference & 1u);
+      value +=
+          static_cast<std::int32_t>(difference >> 1) ^ -static_cast<std::int32_t>(difference & 1u);
       value &= 0xFFFF;
       *out++ = static_cast<std::uint16_t>(value);
     }
@@ -197,7 +198,8 @@ Checked<cv::Mat> decode_depth(const ImageView& image) {
     if (picture.problem) return std::move(*picture.problem);
     values = picture.value->pixels;
     if (picture.value->lossy || values.type() != CV_16UC1) {
-      return damaged(image, "depth in 8 bits or with losses is not used; expected a PNG of 16 bits");
+      return damaged(image,
+                     "depth in 8 bits or with losses is not used; expected a PNG of 16 bits");
     }
   }
   const bool inverse = format.substr(0, 5) == "32FC1";

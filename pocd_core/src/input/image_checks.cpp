@@ -61,9 +61,9 @@ Checked<cv::Mat> copy_of(const ImageView& image, int type) {
 }
 
 InputProblem unknown_encoding(const ImageView& image, const std::string& expected) {
-  return {InputReason::kUnknownEncoding,
-          "encoding \"" + std::string(image.encoding.substr(0, kLongestQuote)) + "\", expected " +
-              expected};
+  return {InputReason::kUnknownEncoding, "encoding \"" +
+                                             std::string(image.encoding.substr(0, kLongestQuote)) +
+                                             "\", expected " + expected};
 }
 
 /// How a colour lies in a pixel; no channels: not a colour.
@@ -262,7 +262,8 @@ LabelTable::LabelTable(const ClassMap& classes) : divisor_(classes.label_divisor
   known_.assign(65536, false);
   const auto mark = [&](int id) {
     const std::size_t begin = static_cast<std::size_t>(id) * static_cast<std::size_t>(divisor_);
-    const std::size_t end = std::min<std::size_t>(begin + static_cast<std::size_t>(divisor_), 65536);
+    const std::size_t end =
+        std::min<std::size_t>(begin + static_cast<std::size_t>(divisor_), 65536);
     for (std::size_t pixel = begin; pixel < end; ++pixel) known_[pixel] = true;
   };
   mark(0);

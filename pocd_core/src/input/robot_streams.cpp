@@ -52,8 +52,7 @@ SynchronizerConfig synchronizer_config(const InputConfig& input, const RobotConf
 }  // namespace
 
 std::string add_transform(const Checked<StampedTransform>& transform, bool is_static,
-                          const std::string& topic, TransformTree& tree,
-                          ProblemCounter& problems) {
+                          const std::string& topic, TransformTree& tree, ProblemCounter& problems) {
   if (transform.problem) {
     problems.count(topic, *transform.problem);
     return "";
@@ -117,8 +116,7 @@ bool RobotStreams::due(StampNs stamp_ns) {
 std::optional<cv::Mat> RobotStreams::converted(Stream stream, const ImageView& image) {
   const std::string on = topic(stream);
   if (stream != Stream::kSegmentation) {
-    Checked<cv::Mat> checked =
-        stream == Stream::kDepth ? depth_image(image) : color_image(image);
+    Checked<cv::Mat> checked = stream == Stream::kDepth ? depth_image(image) : color_image(image);
     if (checked.problem) context_.problems.count(on, *checked.problem);
     return std::move(checked.value);
   }
@@ -131,9 +129,9 @@ std::optional<cv::Mat> RobotStreams::converted(Stream stream, const ImageView& i
   if (mask.unknown_pixels > 0) {
     context_.problems.count(
         on,
-        {InputReason::kUnknownColour,
-         "a colour of no class became class 0: " +
-             percent(mask.unknown_pixels, mask.labels.total()) + " of the pixels"},
+        {InputReason::kUnknownColour, "a colour of no class became class 0: " +
+                                          percent(mask.unknown_pixels, mask.labels.total()) +
+                                          " of the pixels"},
         mask.unknown_pixels);
   }
   if (mask.unlisted_pixels > 0) {
@@ -219,10 +217,10 @@ bool RobotStreams::fit(cv::Mat& image, const SyncedFrame& synced, Stream stream)
     image = std::move(*fitted);
     return true;
   }
-  context_.problems.count(topic(stream),
-                          {InputReason::kSizesDisagree,
-                           "is " + size_text(image) + ", the depth image is " +
-                               size_text(synced.depth) + ": sides of another ratio; frame not used"});
+  context_.problems.count(
+      topic(stream), {InputReason::kSizesDisagree,
+                      "is " + size_text(image) + ", the depth image is " + size_text(synced.depth) +
+                          ": sides of another ratio; frame not used"});
   ++refused_;
   return false;
 }
@@ -234,8 +232,8 @@ std::optional<Frame> RobotStreams::frame_of(const SyncedFrame& synced) {
     return std::nullopt;
   }
   try {
-    Frame frame = make_frame(synced.stamp_ns, synced.camera, synced.T_W_C, synced.depth, labels,
-                             color, on);
+    Frame frame =
+        make_frame(synced.stamp_ns, synced.camera, synced.T_W_C, synced.depth, labels, color, on);
     if (robot_.depth_scale != 1.0) frame.depth_m *= robot_.depth_scale;
     frame.robot = robot_.name;
     frame.sequence = frames_++;
@@ -270,23 +268,23 @@ void RobotStreams::look_for_depth(const Frame& frame) {
     const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
     std::nth_element(depths.begin(), middle, depths.end());
     char text[160];
-    std::snprintf(text, sizeof text,
-                  "the median depth is %.4g m, none is from %.2g to %.4g m: is the unit another one "
-                  "(node.depth_scale, now %g)?",
-                  static_cast<double>(*middle), static_cast<double>(kNearest_m),
-                  context_.max_depth_m, robot_.depth_scale);
+    std::snprintf(
+        text, sizeof text,
+        "the median depth is %.4g m, none is from %.2g to %.4g m: is the unit another one "
+        "(node.depth_scale, now %g)?",
+        static_cast<double>(*middle), static_cast<double>(kNearest_m), context_.max_depth_m,
+        robot_.depth_scale);
     what = text;
   }
-  context_.problems.count(topic(Stream::kDepth),
-                          {InputReason::kNoUsableDepth,
-                           "of the first " + std::to_string(frames_without_depth_) +
-                               " frames no pixel can be used: " + what});
+  context_.problems.count(
+      topic(Stream::kDepth),
+      {InputReason::kNoUsableDepth, "of the first " + std::to_string(frames_without_depth_) +
+                                        " frames no pixel can be used: " + what});
 }
 
 std::vector<Frame> RobotStreams::take(bool last_call) {
   std::vector<Frame> frames;
-  const std::vector<SyncedFrame> ready =
-      last_call ? synchronizer_.flush() : synchronizer_.take();
+  const std::vector<SyncedFrame> ready = last_call ? synchronizer_.flush() : synchronizer_.take();
   for (const TimeSynchronizer::Lack& lack : synchronizer_.take_lacks()) {
     const bool pose = lack.stream == Stream::kPose;
     context_.problems.count(topic(pose ? Stream::kDepth : lack.stream), lack.problem, lack.times);

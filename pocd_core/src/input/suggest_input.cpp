@@ -71,9 +71,8 @@ int rank_of_depth(const TopicInfo& info) {
 }
 
 std::size_t common(const Parts& a, const Parts& b) {
-  const auto ends = std::mismatch(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(std::min(
-                                                            a.size(), b.size())),
-                                  b.begin());
+  const auto ends = std::mismatch(
+      a.begin(), a.begin() + static_cast<std::ptrdiff_t>(std::min(a.size(), b.size())), b.begin());
   return static_cast<std::size_t>(ends.first - a.begin());
 }
 
@@ -107,8 +106,7 @@ std::string joined(const Parts& parts) {
 std::string ros_type_name(const std::string& dds_type) {
   const std::size_t at = dds_type.find("::dds_::");
   if (at == std::string::npos || dds_type.back() != '_') return dds_type;
-  std::string name =
-      dds_type.substr(0, at + 2) + dds_type.substr(at + 8, dds_type.size() - at - 9);
+  std::string name = dds_type.substr(0, at + 2) + dds_type.substr(at + 8, dds_type.size() - at - 9);
   for (std::size_t colons = 0; (colons = name.find("::")) != std::string::npos;) {
     name.replace(colons, 2, "/");
   }
@@ -138,10 +136,9 @@ std::vector<RobotConfig> suggest_robots(const std::vector<TopicInfo>& topics) {
     };
     robot.camera_info_topic = of_type(ros_type(InputStream::kCameraInfo));
     robot.odometry_topic = of_type(ros_type(InputStream::kOdometry));
-    robot.segmentation_topic =
-        nearest(topics, parts, several, [&](const TopicInfo& info) {
-          return is_mask(info) && info.topic != depth.topic;
-        });
+    robot.segmentation_topic = nearest(topics, parts, several, [&](const TopicInfo& info) {
+      return is_mask(info) && info.topic != depth.topic;
+    });
     const std::string own_tf = nearest(topics, parts, true, [&](const TopicInfo& info) {
       return info.type == ros_type(InputStream::kTf) && parts_of(info.topic).back() == "tf";
     });

@@ -167,8 +167,7 @@ bool TimeSynchronizer::passed(Stream stream, StampNs stamp_ns) const {
   return newest && *newest > stamp_ns + config_.tolerance_ns;
 }
 
-TimeSynchronizer::Choice TimeSynchronizer::choose(Stream stream, StampNs stamp_ns,
-                                                  bool last_call) {
+TimeSynchronizer::Choice TimeSynchronizer::choose(Stream stream, StampNs stamp_ns, bool last_call) {
   Queue<cv::Mat>& images = images_of(stream);
   while (!images.empty() && images.front().first < stamp_ns - config_.tolerance_ns) {
     if (stream == Stream::kSegmentation) last_mask_ns_ = images.front().first;
@@ -241,9 +240,9 @@ void TimeSynchronizer::lacks_mask(StampNs stamp_ns, bool used) {
   lacks(Stream::kSegmentation,
         {InputReason::kNoMask,
          "the depth image of " + stamp_text(stamp_ns) + " has no mask within " +
-             milliseconds(config_.tolerance_ns) + ", the nearest is " + milliseconds(std::abs(off)) +
-             (off < 0 ? " earlier" : " later") +
-             (used ? ": used, all pixels with the default class" : ": not used")});
+             milliseconds(config_.tolerance_ns) + ", the nearest is " +
+             milliseconds(std::abs(off)) + (off < 0 ? " earlier" : " later") +
+             (used ? ": the frame goes on without mask" : ": the frame is not used")});
 }
 
 bool TimeSynchronizer::pose_at(const DepthImage& depth, StampNs stamp_ns, bool last_call,

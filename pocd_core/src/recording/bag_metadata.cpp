@@ -60,8 +60,8 @@ std::string bag_metadata_yaml(const BagMetadata& metadata) {
   std::ostringstream out;
   out << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n";
   put_span(out, "  ", start_ns, end_ns);
-  out << "  message_count: " << messages << "\n  topics_with_message_count:"
-      << (topics.str().empty() ? " []" : "") << "\n"
+  out << "  message_count: " << messages
+      << "\n  topics_with_message_count:" << (topics.str().empty() ? " []" : "") << "\n"
       << topics.str() << "  compression_format: \"\"\n  compression_mode: \"\"\n"
       << "  relative_file_paths:\n";
   for (const BagFile& file : metadata.files) {

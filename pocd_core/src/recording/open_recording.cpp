@@ -46,8 +46,8 @@ bool RecordingReader::unpack(RecordedMessage& message) {
     unpacked_ = decompress_message(message.data, message.size, kLargestMessage);
   } catch (const DamagedData& damage) {
     add_problem(info().format + ": " + channels()[message.channel].topic + " at " +
-                std::to_string(message.log_time_ns) + " ns: a compressed message is left out: " +
-                damage.what());
+                std::to_string(message.log_time_ns) +
+                " ns: a compressed message is left out: " + damage.what());
     return false;
   }
   message.data = unpacked_.data();

@@ -132,7 +132,6 @@ class RecordingDataset : public DatasetReader {
     }
   }
 
-  /// One message less is to come.
   void came(const InputTopic& to) {
     for (const auto& [name, robot] : robots_) {
       if (!to.robot.empty() && to.robot != name) continue;
@@ -164,17 +163,16 @@ class RecordingDataset : public DatasetReader {
     const std::string topic = bus_name(channel.topic);
     for (const InputTopic& to : topics_.find(topic)) {
       if (!fits(channel, to.stream)) {
-        counter_.count(topic, {InputReason::kWrongType, "has type " + channel.type + ", expected " +
-                                                            ros_type(to.stream)});
+        counter_.count(topic, {InputReason::kWrongType,
+                               "has type " + channel.type + ", expected " + ros_type(to.stream)});
       } else if (channel.message_encoding != "cdr") {
-        counter_.count(topic, {InputReason::kWrongType, "has messages in \"" +
-                                                            channel.message_encoding +
-                                                            "\", expected \"cdr\""});
+        counter_.count(topic,
+                       {InputReason::kWrongType,
+                        "has messages in \"" + channel.message_encoding + "\", expected \"cdr\""});
       }
     }
   }
 
-  /// False when there is no other file.
   bool open_next_file() {
     if (reader_ != nullptr) files_.close(next_file_ - 1);
     reader_ = nullptr;
@@ -205,13 +203,11 @@ class RecordingDataset : public DatasetReader {
     return last_ns;
   }
 
-  /// Stamp of the first depth image in the file.
   std::optional<StampNs> first_stamp() {
     reader_->select([this](const RecordedChannel& channel) {
       const Feeds feeds = feeds_of(channel);
-      return std::any_of(feeds.begin(), feeds.end(), [](const InputTopic& to) {
-        return to.stream == InputStream::kDepth;
-      });
+      return std::any_of(feeds.begin(), feeds.end(),
+                         [](const InputTopic& to) { return to.stream == InputStream::kDepth; });
     });
     RecordedMessage message;
     for (reader_->seek(0); reader_->next(message);) {
@@ -263,9 +259,8 @@ class RecordingDataset : public DatasetReader {
   }
 
   void add(const RecordedMessage& message, const InputTopic& to) {
-    RobotStreams* robot = to.robot.empty() && robots_.count("") == 0
-                              ? nullptr
-                              : robots_.at(to.robot).get();
+    RobotStreams* robot =
+        to.robot.empty() && robots_.count("") == 0 ? nullptr : robots_.at(to.robot).get();
     switch (to.stream) {
       case InputStream::kDepth:
       case InputStream::kSegmentation:
@@ -278,8 +273,7 @@ class RecordingDataset : public DatasetReader {
       case InputStream::kCameraInfo: {
         const RosCameraInfo info = decode_camera_info(message.data, message.size);
         const StampNs stamp_ns = info.header.stamp_ns;
-        robot->add_camera_info(stamp_ns == 0 ? 0 : stamp_ns + shift_ns_,
-                               camera_model(info.fields));
+        robot->add_camera_info(stamp_ns == 0 ? 0 : stamp_ns + shift_ns_, camera_model(info.fields));
         return;
       }
       case InputStream::kOdometry:
@@ -345,9 +339,10 @@ class RecordingDataset : public DatasetReader {
                           " times in all");
     }
     if (no_transform && statics_ == 0) {
-      problems_.push_back(bus_name(input_.topics.tf_static) +
-                          ": the recording has no message on it: it is sent once, at the beginning, "
-                          "so of a split recording the first part has it");
+      problems_.push_back(
+          bus_name(input_.topics.tf_static) +
+          ": the recording has no message on it: it is sent once, at the beginning, "
+          "so of a split recording the first part has it");
     }
     for (const auto& [name, robot] : robots_) {
       const std::string losses = robot->losses();
@@ -356,7 +351,6 @@ class RecordingDataset : public DatasetReader {
     }
   }
 
-  /// The first problem of its kind on a topic.
   void tell(const ProblemCounter::Entry& entry) {
     const std::string at =
         message_ ? " at " + std::to_string(message_->log_time_ns) + " ns" : std::string();

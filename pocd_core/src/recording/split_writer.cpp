@@ -97,8 +97,8 @@ void SplitWriter::write(const MessageHeader& header, const std::uint8_t* data, s
 
 void SplitWriter::count_message(const MessageHeader& header) {
   FileCount& file = counts_.back();
-  file.start_ns = file.messages == 0 ? header.log_time_ns
-                                     : std::min(file.start_ns, header.log_time_ns);
+  file.start_ns =
+      file.messages == 0 ? header.log_time_ns : std::min(file.start_ns, header.log_time_ns);
   file.end_ns = std::max(file.end_ns, header.log_time_ns);
   ++file.messages;
   ++messages_of_[header.channel];

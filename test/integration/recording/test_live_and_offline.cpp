@@ -1,4 +1,5 @@
-// What robots really record gives the same map, and the same words about it, offline and on the bus.
+// What robots really record gives the same map, and the same words about it, offline and on the
+// bus.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -19,17 +20,17 @@ constexpr int kFrames = 20;
 /// What a robot does differently.
 struct Variant {
   std::string name;
-  StampNs mask_offset = 0;       // of its stamps
+  StampNs mask_offset = 0;  // of its stamps
   int mask_id = 7;
   bool info_stamped = true;
-  double quaternion = 1.0;       // length
-  std::string slash;             // before the names of frames
+  double quaternion = 1.0;  // length
+  std::string slash;        // before the names of frames
   std::string tf = "/tf", tf_static = "/tf_static";
   int frame_changes_at = kFrames;
-  StampNs camera_clock = 0;      // offset of all stamps of the camera
+  StampNs camera_clock = 0;  // offset of all stamps of the camera
   std::map<std::string, std::string> qos;
   std::vector<std::string> settings;
-  int frames = kFrames;          // that are made
+  int frames = kFrames;           // that are made
   std::set<std::string> reasons;  // that are named
 };
 
@@ -84,8 +85,8 @@ void write(const fs::path& file, const Variant& v) {
   std::map<std::string, std::uint16_t> channels;
   const auto add = [&](const std::string& topic, const std::string& type,
                        const std::map<std::string, std::string>& metadata = {}) {
-    channels[topic] = writer.add_channel(writer.add_schema(type, "ros2msg", ""), topic, "cdr",
-                                         metadata);
+    channels[topic] =
+        writer.add_channel(writer.add_schema(type, "ros2msg", ""), topic, "cdr", metadata);
   };
   add("/robot1/depth/image_raw", "sensor_msgs/msg/Image");
   add("/robot1/segmentation", "sensor_msgs/msg/Image");
@@ -108,7 +109,8 @@ void write(const fs::path& file, const Variant& v) {
     const std::string frame = v.slash + (i < v.frame_changes_at ? "camera" : "elsewhere");
     put("/robot1/depth/camera_info", t,
         camera_info_payload(v.info_stamped ? image_t : 0, frame, camera));
-    put("/robot1/segmentation", t + 10, image_payload(image_t + v.mask_offset, frame, "mono8", mask));
+    put("/robot1/segmentation", t + 10,
+        image_payload(image_t + v.mask_offset, frame, "mono8", mask));
     put("/robot1/depth/image_raw", t + 20, image_payload(image_t, frame, "16UC1", depth));
     put(v.tf, t + 30, tf_payload(t, v.slash + "map", v.slash + "base", T));
   }
@@ -138,16 +140,22 @@ std::string words(const std::string& text, const std::string& reason) {
 }
 
 TEST(LiveAndOffline, TheSameFramesTheSameMapTheSameWords) {
-  const std::set<std::string> all_reasons{"no_mask",       "unlisted_class", "frame_changed",
-                                          "no_pose",       "no_transform",   "non_unit_quaternion",
+  const std::set<std::string> all_reasons{"no_mask",        "unlisted_class", "frame_changed",
+                                          "no_pose",        "no_transform",   "non_unit_quaternion",
                                           "no_usable_depth"};
   for (const Variant& variant : variants()) {
     SCOPED_TRACE(variant.name);
     const Folder folder;
     const fs::path file = folder / "run.mcap";
     write(file, variant);
-    std::vector<std::string> map{command("pocd_map"), "--dataset", "mcap",     "--input",
-                                 file.string(),       "--config",  config(),   "--output",
+    std::vector<std::string> map{command("pocd_map"),
+                                 "--dataset",
+                                 "mcap",
+                                 "--input",
+                                 file.string(),
+                                 "--config",
+                                 config(),
+                                 "--output",
                                  (folder / "map").string()};
     map.insert(map.end(), variant.settings.begin(), variant.settings.end());
     const CommandResult mapped = run_command(map);
@@ -194,8 +202,8 @@ TEST(LiveAndOffline, OptionsSayWhatIsLatched) {
   write(file, variant);
   Process node({command("pocd_node"), "--config", config(), "--robot", "robot1", "--lossless"});
   ASSERT_TRUE(says(node, "running on domain"));
-  const CommandResult played = run_command({command("pocd_play"), file.string(), "--lossless",
-                                            "--fast", "--latch", "/tf_static"});
+  const CommandResult played = run_command(
+      {command("pocd_play"), file.string(), "--lossless", "--fast", "--latch", "/tf_static"});
   EXPECT_EQ(played.exit_code, 0) << played.err;
   EXPECT_NE(stop(node).err.find("ended: 20 frames"), std::string::npos);
   const CommandResult typo = run_command({command("pocd_play"), file.string(), "--latch", "/tff"});

@@ -131,9 +131,9 @@ TEST(DepthImage, InverseDepthIsMetresAgain) {
   inverse.at<std::uint16_t>(0, 1) = static_cast<std::uint16_t>(a / metres[1] + b);
   inverse.at<std::uint16_t>(0, 2) = 0;
   for (const bool with_rvl : {false, true}) {
-    const auto depth = depth_image(
-        packed(with_header(a, b, with_rvl ? rvl(inverse) : picture(inverse, ".png")),
-               with_rvl ? "32FC1; compressedDepth rvl" : "32FC1; compressedDepth png"));
+    const auto depth =
+        depth_image(packed(with_header(a, b, with_rvl ? rvl(inverse) : picture(inverse, ".png")),
+                           with_rvl ? "32FC1; compressedDepth rvl" : "32FC1; compressedDepth png"));
     ASSERT_TRUE(depth.value) << depth.problem->detail;
     ASSERT_EQ(depth.value->type(), CV_32FC1);
     // One step of the quantisation is metres^2 / a.
@@ -157,9 +157,9 @@ TEST(DepthImage, DamagedCompressionIsNamedAndNeverReadBeyond) {
         packed(bytes, with_rvl ? "16UC1; compressedDepth rvl" : "16UC1; compressedDepth png"));
     EXPECT_TRUE(read.value || !read.problem->detail.empty());
   }
-  const auto jpeg = depth_image(
-      packed(with_header(0, 0, picture(cv::Mat(9, 9, CV_8UC1, cv::Scalar(3)), ".jpg")),
-             "16UC1; compressedDepth"));
+  const auto jpeg =
+      depth_image(packed(with_header(0, 0, picture(cv::Mat(9, 9, CV_8UC1, cv::Scalar(3)), ".jpg")),
+                         "16UC1; compressedDepth"));
   ASSERT_TRUE(jpeg.problem);
   EXPECT_STREQ(to_string(jpeg.problem->reason), "bad_compression");
   const auto nothing = depth_image(packed(Bytes(600, 5), "16UC1; compressedDepth"));
@@ -213,7 +213,8 @@ TEST(LabelImage, PngKeepsIdsAndJpegFindsTheNearestColour) {
   EXPECT_TRUE(same(png.value->labels, ids));
   cv::Mat colours(32, 32, CV_8UC3, cv::Scalar(102, 0, 255));  // BGR
   colours.rowRange(0, 16).setTo(cv::Scalar(153, 153, 0));
-  const auto jpeg = label_image(packed(picture(colours, ".jpg"), "rgb8; jpeg compressed bgr8"), table);
+  const auto jpeg =
+      label_image(packed(picture(colours, ".jpg"), "rgb8; jpeg compressed bgr8"), table);
   ASSERT_TRUE(jpeg.value);
   EXPECT_EQ(jpeg.value->labels.at<std::uint16_t>(4, 4), 7);
   EXPECT_EQ(jpeg.value->labels.at<std::uint16_t>(28, 4), 300);

@@ -26,51 +26,55 @@ struct Camera {
 };
 
 std::vector<Camera> cameras() {
-  return {
-      {"realsense", "realsense",
-       {{"rt/camera/camera/depth/image_rect_raw", kImage},
-        {"rt/camera/camera/depth/camera_info", kInfo},
-        {"rt/camera/camera/aligned_depth_to_color/image_raw", kImage},
-        {"rt/camera/camera/aligned_depth_to_color/image_raw/compressedDepth", kCompressed},
-        {"rt/camera/camera/aligned_depth_to_color/camera_info", kInfo},
-        {"rt/camera/camera/infra1/image_rect_raw", kImage},
-        {"rt/camera/camera/color/image_raw", kImage},
-        {"rt/camera/camera/color/camera_info", kInfo}},
-       "rt/camera/camera/aligned_depth_to_color/image_raw",
-       "rt/camera/camera/aligned_depth_to_color/camera_info"},
-      {"zed", "zed",
-       {{"rt/zed/zed_node/depth/depth_registered", kImage},
-        {"rt/zed/zed_node/depth/camera_info", kInfo},
-        {"rt/zed/zed_node/confidence/confidence_map", kImage},
-        {"rt/zed/zed_node/rgb/image_rect_color", kImage},
-        {"rt/zed/zed_node/rgb/camera_info", kInfo},
-        {"rt/zed/zed_node/odom", kOdometry}},
-       "rt/zed/zed_node/depth/depth_registered",
-       "rt/zed/zed_node/depth/camera_info"},
-      {"orbbec", "orbbec",
-       {{"rt/camera/color/camera_info", kInfo},
-        {"rt/camera/color/image_raw", kImage},
-        {"rt/camera/depth/image_raw", kImage},
-        {"rt/camera/depth/camera_info", kInfo},
-        {"rt/camera/ir/image_raw", kImage},
-        {"rt/camera/ir/camera_info", kInfo}},
-       "rt/camera/depth/image_raw",
-       "rt/camera/depth/camera_info"},
-      {"oak_d", "oak_d",
-       {{"rt/oak/rgb/image_raw", kImage},
-        {"rt/oak/rgb/camera_info", kInfo},
-        {"rt/oak/stereo/image_raw", kImage},
-        {"rt/oak/stereo/camera_info", kInfo}},
-       "rt/oak/stereo/image_raw",
-       "rt/oak/stereo/camera_info"},
-      {"isaac_sim", "isaac_sim",
-       {{"rt/rgb", kImage},
-        {"rt/depth", kImage},
-        {"rt/camera_info", kInfo},
-        {"rt/semantic_segmentation", kImage},
-        {"rt/odom", kOdometry}},
-       "rt/depth",
-       "rt/camera_info"}};
+  return {{"realsense",
+           "realsense",
+           {{"rt/camera/camera/depth/image_rect_raw", kImage},
+            {"rt/camera/camera/depth/camera_info", kInfo},
+            {"rt/camera/camera/aligned_depth_to_color/image_raw", kImage},
+            {"rt/camera/camera/aligned_depth_to_color/image_raw/compressedDepth", kCompressed},
+            {"rt/camera/camera/aligned_depth_to_color/camera_info", kInfo},
+            {"rt/camera/camera/infra1/image_rect_raw", kImage},
+            {"rt/camera/camera/color/image_raw", kImage},
+            {"rt/camera/camera/color/camera_info", kInfo}},
+           "rt/camera/camera/aligned_depth_to_color/image_raw",
+           "rt/camera/camera/aligned_depth_to_color/camera_info"},
+          {"zed",
+           "zed",
+           {{"rt/zed/zed_node/depth/depth_registered", kImage},
+            {"rt/zed/zed_node/depth/camera_info", kInfo},
+            {"rt/zed/zed_node/confidence/confidence_map", kImage},
+            {"rt/zed/zed_node/rgb/image_rect_color", kImage},
+            {"rt/zed/zed_node/rgb/camera_info", kInfo},
+            {"rt/zed/zed_node/odom", kOdometry}},
+           "rt/zed/zed_node/depth/depth_registered",
+           "rt/zed/zed_node/depth/camera_info"},
+          {"orbbec",
+           "orbbec",
+           {{"rt/camera/color/camera_info", kInfo},
+            {"rt/camera/color/image_raw", kImage},
+            {"rt/camera/depth/image_raw", kImage},
+            {"rt/camera/depth/camera_info", kInfo},
+            {"rt/camera/ir/image_raw", kImage},
+            {"rt/camera/ir/camera_info", kInfo}},
+           "rt/camera/depth/image_raw",
+           "rt/camera/depth/camera_info"},
+          {"oak_d",
+           "oak_d",
+           {{"rt/oak/rgb/image_raw", kImage},
+            {"rt/oak/rgb/camera_info", kInfo},
+            {"rt/oak/stereo/image_raw", kImage},
+            {"rt/oak/stereo/camera_info", kInfo}},
+           "rt/oak/stereo/image_raw",
+           "rt/oak/stereo/camera_info"},
+          {"isaac_sim",
+           "isaac_sim",
+           {{"rt/rgb", kImage},
+            {"rt/depth", kImage},
+            {"rt/camera_info", kInfo},
+            {"rt/semantic_segmentation", kImage},
+            {"rt/odom", kOdometry}},
+           "rt/depth",
+           "rt/camera_info"}};
 }
 
 /// As if the driver were started in a namespace; `camera` stays below where the driver keeps it.
@@ -137,10 +141,11 @@ TEST(SuggestInput, TheTextListsImageTopicsAndWhatToWrite) {
   EXPECT_EQ(suggestion_text({{"rt/odom", kOdometry}}), "there is no image topic at all");
   const std::string text = suggestion_text(cameras()[0].topics);
   EXPECT_NE(text.find("rt/camera/camera/infra1/image_rect_raw"), std::string::npos) << text;
-  EXPECT_NE(text.find("--set 'node.topics.depth=rt/{robot}/camera/aligned_depth_to_color/image_raw' "
-                      "--set 'node.topics.camera_info="
-                      "rt/{robot}/camera/aligned_depth_to_color/camera_info'"),
-            std::string::npos)
+  EXPECT_NE(
+      text.find("--set 'node.topics.depth=rt/{robot}/camera/aligned_depth_to_color/image_raw' "
+                "--set 'node.topics.camera_info="
+                "rt/{robot}/camera/aligned_depth_to_color/camera_info'"),
+      std::string::npos)
       << text;
 }
 
@@ -156,13 +161,15 @@ TEST(CameraConfigs, NameTheDriversTopicsWithAndWithoutNamespace) {
     EXPECT_EQ(robot_of(single, camera.depth, InputStream::kDepth), "robot1") << camera.name;
     EXPECT_EQ(robot_of(single, camera.info, InputStream::kCameraInfo), "robot1") << camera.name;
     const InputConfig fleet = load(std::string(camera.file) + "_namespaced");
-    const bool replaces = std::string(camera.name) == "realsense" || std::string(camera.name) == "zed";
+    const bool replaces =
+        std::string(camera.name) == "realsense" || std::string(camera.name) == "zed";
     for (const std::string robot : {"r1", "r2"}) {
       EXPECT_EQ(robot_of(fleet, in_namespace(camera.depth, robot, replaces), InputStream::kDepth),
                 robot)
           << camera.name;
-      EXPECT_EQ(robot_of(fleet, in_namespace(camera.info, robot, replaces), InputStream::kCameraInfo),
-                robot)
+      EXPECT_EQ(
+          robot_of(fleet, in_namespace(camera.info, robot, replaces), InputStream::kCameraInfo),
+          robot)
           << camera.name;
     }
   }

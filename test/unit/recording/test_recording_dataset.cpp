@@ -78,7 +78,8 @@ TEST(RecordingDataset, BadMessagesCostTheirFrameAndAreNamed) {
   const std::vector<Frame> frames = frames_of(*reader);
   EXPECT_EQ(frames.size(), 18u);
   ASSERT_EQ(reader->problems().size(), 3u);
-  EXPECT_NE(reader->problems()[0].find("/a/depth/image_raw at 5300000000 ns: unknown_encoding: encoding \"rgb8\""),
+  EXPECT_NE(reader->problems()[0].find(
+                "/a/depth/image_raw at 5300000000 ns: unknown_encoding: encoding \"rgb8\""),
             std::string::npos);
   EXPECT_NE(reader->problems()[1].find("bytes of payload are missing"), std::string::npos);
   EXPECT_NE(reader->problems()[2].find("rt/a/segmentation: no_mask"), std::string::npos);
@@ -110,7 +111,8 @@ TEST(RecordingDataset, OneBadTransformCostsTheOthersOfItsMessageNothing) {
   const auto reader = open_recorded(options_for({folder / "run.mcap"}));
   EXPECT_EQ(frames_of(*reader).size(), 10u);
   ASSERT_EQ(reader->problems().size(), 3u);
-  EXPECT_NE(reader->problems()[0].find("/tf_static at 4999998000 ns: non_unit_quaternion: quaternion has length 0"),
+  EXPECT_NE(reader->problems()[0].find(
+                "/tf_static at 4999998000 ns: non_unit_quaternion: quaternion has length 0"),
             std::string::npos);
   EXPECT_NE(reader->problems()[1].find("frame \"b/camera\" had parent \"b/mast\""),
             std::string::npos);

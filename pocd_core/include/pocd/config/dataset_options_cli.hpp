@@ -12,7 +12,8 @@ class App;
 
 namespace pocd {
 
-/// Adds --dataset, --input, --repeat, --rate, --gravity, --camera, --camera-pose, --mount, --seed and
+/// Adds --dataset, --input, --repeat, --rate, --gravity, --camera, --camera-pose, --mount, --seed
+/// and
 /// --sensor to `app`; parsing it fills
 /// `options`, which must outlive the parse. A bad value is a CLI::ParseError.
 void add_dataset_options(CLI::App& app, DatasetOptions& options);

@@ -143,9 +143,10 @@ struct InputConfig {
           "How far robots may run ahead of one that is late [s of data time].");
     visit("max_frame_rate_hz", max_frame_rate_hz, Range{0.0, 1000.0},
           "Depth images of a robot beyond this rate of their stamps are left out; 0: none [1/s].");
-    visit("depth_scale", depth_scale, Range{1e-6, 1000.0},
-          "Factor on depth values: 1 for millimetres (16 bit) and metres (float), 0.1 for tenths of "
-          "a millimetre, 0.001 for float millimetres.");
+    visit(
+        "depth_scale", depth_scale, Range{1e-6, 1000.0},
+        "Factor on depth values: 1 for millimetres (16 bit) and metres (float), 0.1 for tenths of "
+        "a millimetre, 0.001 for float millimetres.");
   }
   std::vector<std::string> inconsistencies() const;
 

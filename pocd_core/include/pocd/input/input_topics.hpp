@@ -45,7 +45,7 @@ class InputTopics {
 
  private:
   std::multimap<std::string, InputTopic> named_;
-  std::vector<std::string> names_;                              // of the named robots
+  std::vector<std::string> names_;                             // of the named robots
   std::vector<std::pair<std::string, InputStream>> patterns_;  // of discovered ones
 };
 

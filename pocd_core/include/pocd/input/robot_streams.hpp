@@ -20,7 +20,7 @@ namespace pocd {
 struct StreamContext {
   const InputConfig& input;
   const LabelTable& labels;
-  double max_depth_m;              ///< no pixel beyond it is used
+  double max_depth_m;               ///< no pixel beyond it is used
   const TransformTree& transforms;  ///< of the topics that all robots share
   ProblemCounter& problems;         ///< everything that is refused or replaced
 };

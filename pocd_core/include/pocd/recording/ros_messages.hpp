@@ -16,8 +16,8 @@ struct RosHeader {
   std::string frame_id;
 };
 
-/// sensor_msgs/Image or, with `compressed`, CompressedImage: its format is the encoding. `data` is a
-/// view into the payload.
+/// sensor_msgs/Image or, with `compressed`, CompressedImage: its format is the encoding. `data` is
+/// a view into the payload.
 struct RosImage {
   RosHeader header;
   std::uint32_t height = 0, width = 0;
