@@ -234,7 +234,9 @@ std::optional<Frame> RobotStreams::frame_of(const SyncedFrame& synced) {
   try {
     Frame frame =
         make_frame(synced.stamp_ns, synced.camera, synced.T_W_C, synced.depth, labels, color, on);
-    if (robot_.depth_scale != 1.0) frame.depth_m *= robot_.depth_scale;
+    if (robot_.depth_scale != 1.0) {
+      frame.depth_m.convertTo(frame.depth_m, CV_32F, robot_.depth_scale);
+    }
     frame.robot = robot_.name;
     frame.sequence = frames_++;
     if (!depth_seen_) look_for_depth(frame);
