@@ -71,6 +71,7 @@ RobotStreams::RobotStreams(const RobotConfig& robot, const StreamContext& contex
       transforms_(nanoseconds(context.input.max_pose_gap_s), 1000, &own_transforms_),
       synchronizer_(synchronizer_config(context.input, robot), transforms_) {
   robot_.camera_frame = frame_name(robot_.camera_frame);
+  camera_frame_ = robot_.camera_frame;
   if (robot_.depth_scale == 0.0) robot_.depth_scale = context.input.depth_scale;
   const MountConfig& mount = robot.mount;
   if (!mount.given) return;
@@ -150,32 +151,28 @@ bool RobotStreams::add_image(Stream stream, StampNs stamp_ns, const std::string&
   if (stream == Stream::kDepth && !due(stamp_ns)) return false;
   std::optional<cv::Mat> pixels = converted(stream, image);
   if (!pixels) return false;
-  const std::string camera = frame_name(frame);
-  if (stream == Stream::kDepth && !accept_camera_frame(camera)) return false;
-  const bool named = stream == Stream::kDepth && robot_.camera_frame.empty();
-  const auto problem =
-      synchronizer_.add_image(stream, stamp_ns, std::move(*pixels), named ? camera : "");
+  if (stream == Stream::kDepth && !accept_camera_frame(frame_name(frame))) return false;
+  const auto problem = synchronizer_.add_image(stream, stamp_ns, std::move(*pixels));
   if (problem) context_.problems.count(topic(stream), *problem);
   return !stamp_refused(problem);
 }
 
-// Another frame than at first is one that the transforms know; a mount is that of one camera.
 bool RobotStreams::accept_camera_frame(const std::string& frame) {
-  if (!robot_.camera_frame.empty() || camera_frames_.count(frame) > 0) return true;
+  if (!robot_.camera_frame.empty() || (!frame.empty() && frame == camera_frame_)) return true;
   if (frame.empty()) {
     context_.problems.count(topic(Stream::kDepth),
                             {InputReason::kEmptyFrameName, "header.frame_id is empty"});
     return false;
   }
-  if (!camera_frames_.empty() && (robot_.mount.given || !transforms_.knows(frame))) {
-    context_.problems.count(
-        topic(Stream::kDepth),
-        {InputReason::kFrameChanged,
-         "header.frame_id was \"" + *camera_frames_.begin() + "\", now \"" + frame + "\"" +
-             (robot_.mount.given ? "" : ", of which no transform tells") + ": image not used"});
+  if (!camera_frame_.empty()) {
+    context_.problems.count(topic(Stream::kDepth),
+                            {InputReason::kFrameChanged,
+                             "header.frame_id was \"" + camera_frame_ + "\", now \"" + frame +
+                                 "\": image not used (another camera needs an entry of its own)"});
     return false;
   }
-  camera_frames_.insert(frame);
+  camera_frame_ = frame;
+  synchronizer_.set_camera_frame(frame);
   if (robot_.mount.given) transforms_.set_static(robot_.mount.base_frame, frame, mount_);
   return true;
 }
@@ -298,17 +295,12 @@ std::vector<Frame> RobotStreams::take(bool last_call) {
 }
 
 std::vector<std::string> RobotStreams::restart() {
-  std::set<std::string> cameras = camera_frames_;
-  if (!robot_.camera_frame.empty()) cameras.insert(robot_.camera_frame);
-  std::vector<std::string> frames;
-  for (const std::string& camera : cameras) {
-    const auto chain = transforms_.chain(frame_name(context_.input.map_frame), camera);
-    frames.insert(frames.end(), chain.begin(), chain.end());
-  }
+  std::vector<std::string> frames =
+      transforms_.chain(frame_name(context_.input.map_frame), camera_frame_);
   synchronizer_.restart();
   transforms_.forget_moving();
   own_transforms_.forget_moving();
-  camera_frames_.clear();
+  if (robot_.camera_frame.empty()) camera_frame_.clear();
   camera_.reset();
   due_ns_.reset();
   depth_seen_ = false;

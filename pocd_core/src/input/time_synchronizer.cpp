@@ -116,12 +116,12 @@ TimeSynchronizer::Queue<cv::Mat>& TimeSynchronizer::images_of(Stream stream) {
 }
 
 std::optional<InputProblem> TimeSynchronizer::add_image(Stream stream, StampNs stamp_ns,
-                                                        cv::Mat image, const std::string& frame) {
+                                                        cv::Mat image) {
   POCD_CHECK(stream != Stream::kCameraInfo && stream != Stream::kPose);
   auto problem = judge(stream, stamp_ns);
   if (stamp_refused(problem)) return problem;
   if (stream == Stream::kDepth) {
-    depth_.push_back({stamp_ns, {std::move(image), frame}});
+    depth_.emplace_back(stamp_ns, std::move(image));
     if (depth_.size() <= 2 * config_.capacity) return problem;  // run() comes first
     ++counts_.dropped_overflow;
     watermark_ns_ = depth_.front().first;
@@ -245,11 +245,9 @@ void TimeSynchronizer::lacks_mask(StampNs stamp_ns, bool used) {
              (used ? ": the frame goes on without mask" : ": the frame is not used")});
 }
 
-bool TimeSynchronizer::pose_at(const DepthImage& depth, StampNs stamp_ns, bool last_call,
-                               Pose& T_W_C, bool& found) {
+bool TimeSynchronizer::pose_at(StampNs stamp_ns, bool last_call, Pose& T_W_C, bool& found) {
   const bool is_settled = settled(Stream::kPose, stamp_ns, last_call);
-  const std::string& frame = depth.frame.empty() ? config_.camera_frame : depth.frame;
-  const TransformLookup pose = transforms_.lookup(config_.map_frame, frame, stamp_ns,
+  const TransformLookup pose = transforms_.lookup(config_.map_frame, config_.camera_frame, stamp_ns,
                                                   is_settled ? config_.extrapolation_ns : 0);
   found = pose.result == PoseLookup::kFound;
   if (found) {
@@ -267,7 +265,8 @@ bool TimeSynchronizer::pose_at(const DepthImage& depth, StampNs stamp_ns, bool l
                        : too_new ? last_call && pose.off_ns <= kNobodysMistake
                                  : last_call && counts_.complete > 0;
   if (!excused) {
-    lacks(Stream::kPose, transforms_.explain(config_.map_frame, frame, stamp_ns, pose));
+    lacks(Stream::kPose,
+          transforms_.explain(config_.map_frame, config_.camera_frame, stamp_ns, pose));
   }
   return true;
 }
@@ -290,7 +289,7 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
       ++counts_.dropped_no_camera_info;
       used = false;
     }
-    if (used && !pose_at(depth_.front().second, stamp_ns, last_call, frame.T_W_C, used)) break;
+    if (used && !pose_at(stamp_ns, last_call, frame.T_W_C, used)) break;
     Choice labels, color;
     const auto waits = [&](StreamUse use, Stream stream, Choice& choice) {
       if (!used || use == StreamUse::kAbsent) return false;
@@ -313,7 +312,7 @@ std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
     }
     use_up(Stream::kSegmentation, labels);
     use_up(Stream::kColor, color);
-    frame.depth = std::move(depth_.front().second.image);
+    frame.depth = std::move(depth_.front().second);
     frame.labels = labels.image;
     frame.color = color.image;
     depth_.pop_front();

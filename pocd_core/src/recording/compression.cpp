@@ -153,10 +153,31 @@ bool is_zstd(const std::uint8_t* data, std::size_t size) {
 
 Bytes decompress_message(const std::uint8_t* data, std::size_t size, std::size_t most) {
   const unsigned long long content = ZSTD_getFrameContentSize(data, size);
-  if (content == ZSTD_CONTENTSIZE_UNKNOWN || content == ZSTD_CONTENTSIZE_ERROR || content > most) {
-    throw DamagedData(0, "zstd: the message does not say its size, or is too large");
+  if (content == ZSTD_CONTENTSIZE_ERROR) throw DamagedData(0, "zstd: no frame");
+  if (content != ZSTD_CONTENTSIZE_UNKNOWN && content <= most) {
+    return decompress_zstd(data, size, static_cast<std::size_t>(content));
   }
-  return decompress_zstd(data, size, static_cast<std::size_t>(content));
+  // Written as a stream: the size shows at the end only.
+  const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(),
+                                                                          &ZSTD_freeDStream);
+  POCD_CHECK(stream != nullptr);
+  Bytes out;
+  ZSTD_inBuffer input{data, size, 0};
+  for (std::size_t wanted = 1; wanted != 0;) {
+    const std::size_t before = out.size(), in_before = input.pos;
+    out.resize(before + ZSTD_DStreamOutSize());
+    ZSTD_outBuffer output{out.data() + before, out.size() - before, 0};
+    wanted = ZSTD_decompressStream(stream.get(), &output, &input);
+    if (ZSTD_isError(wanted)) {
+      throw DamagedData(input.pos, std::string("zstd: ") + ZSTD_getErrorName(wanted));
+    }
+    out.resize(before + output.pos);
+    if (out.size() > most) throw DamagedData(0, "zstd: the message is too large");
+    if (wanted != 0 && output.pos == 0 && input.pos == in_before) {
+      throw DamagedData(input.pos, "zstd: data ends early");
+    }
+  }
+  return out;
 }
 
 }  // namespace pocd::recording

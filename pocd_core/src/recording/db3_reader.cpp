@@ -69,7 +69,7 @@ class Db3Reader : public RecordingReader {
       message.publish_time_ns = message.log_time_ns;
       message.data = static_cast<const std::uint8_t*>(sqlite3_column_blob(messages_.get(), 2));
       message.size = static_cast<std::size_t>(sqlite3_column_bytes(messages_.get(), 2));
-      if (unpack(message)) return true;
+      if (unpack(message, name_)) return true;
     }
     return false;
   }

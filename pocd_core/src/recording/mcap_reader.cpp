@@ -205,7 +205,7 @@ void McapReader::load(const Block& block) {
 
 bool McapReader::next(RecordedMessage& message) {
   while (next_in_order(message)) {
-    if (unpack(message)) return true;
+    if (unpack(message, name_)) return true;
   }
   return false;
 }

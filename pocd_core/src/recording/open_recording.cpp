@@ -40,12 +40,12 @@ std::unique_ptr<RecordingReader> open_recording(const fs::path& file, const Read
   return open_plain(file, file.string(), std::move(source), limits);
 }
 
-bool RecordingReader::unpack(RecordedMessage& message) {
+bool RecordingReader::unpack(RecordedMessage& message, const std::string& name) {
   if (!is_zstd(message.data, message.size)) return true;
   try {
     unpacked_ = decompress_message(message.data, message.size, kLargestMessage);
   } catch (const DamagedData& damage) {
-    add_problem(info().format + ": " + channels()[message.channel].topic + " at " +
+    add_problem(name + ": " + channels()[message.channel].topic + " at " +
                 std::to_string(message.log_time_ns) +
                 " ns: a compressed message is left out: " + damage.what());
     return false;

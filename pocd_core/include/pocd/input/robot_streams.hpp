@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -59,7 +58,7 @@ class RobotStreams {
   std::vector<Frame> take(bool last_call);
 
   /// The source has gone, and nothing of it is pending: the next one may have other clocks, frames
-  /// and intrinsics. The frames from its cameras up to the map, as far as they are known.
+  /// and intrinsics. The frames from its camera up to the map, as far as they are known.
   std::vector<std::string> restart();
 
   /// Frames made so far; those that were dropped for something they lacked; images left out by
@@ -83,8 +82,8 @@ class RobotStreams {
   PoseQuaternion mount_;
   TransformTree own_transforms_, transforms_;
   TimeSynchronizer synchronizer_;
-  std::set<std::string> camera_frames_;  ///< as the depth images have named them
-  std::optional<CameraModel> camera_;    ///< as its source said last
+  std::string camera_frame_;           ///< "" until the first depth image
+  std::optional<CameraModel> camera_;  ///< as its source said last
   std::optional<StampNs> due_ns_;
   int frames_without_depth_ = 0;  ///< as long as none has had a pixel in range
   bool depth_seen_ = false;

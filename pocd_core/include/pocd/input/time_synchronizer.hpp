@@ -80,9 +80,7 @@ class TimeSynchronizer {
 
   /// kStampBackwards, and nothing stored, when the stamp is not after the stream's newest one;
   /// kStampsRestarted: stored, and what the stream had at this stamp or later is dropped.
-  /// `frame` is that of a depth image in the transforms; "": the configured one.
-  std::optional<InputProblem> add_image(Stream stream, StampNs stamp_ns, cv::Mat image,
-                                        const std::string& frame = "");
+  std::optional<InputProblem> add_image(Stream stream, StampNs stamp_ns, cv::Mat image);
   /// Intrinsics with stamp 0 hold from now on, until others come.
   std::optional<InputProblem> add_camera_info(StampNs stamp_ns, const CameraModel& camera);
   /// Tells how far the pose stream has come, for the bounded wait; `problem` is what the transforms
@@ -92,6 +90,9 @@ class TimeSynchronizer {
   /// Of one stream, or of all; kBounded until something else is said.
   void set_patience(Stream stream, Patience patience) { patience_[stream] = patience; }
   void set_patience(Patience patience);
+
+  /// Frame of the depth camera in the transforms, when only the first image tells.
+  void set_camera_frame(const std::string& frame) { config_.camera_frame = frame; }
 
   /// Frames that are ready, by stamp.
   std::vector<SyncedFrame> take();
@@ -123,10 +124,6 @@ class TimeSynchronizer {
   const SynchronizerCounts& counts() const { return counts_; }
 
  private:
-  struct DepthImage {
-    cv::Mat image;
-    std::string frame;
-  };
   template <class T>
   using Queue = std::deque<std::pair<StampNs, T>>;
   /// What a frame takes of one stream of images.
@@ -144,7 +141,7 @@ class TimeSynchronizer {
   void use_up(Stream stream, const Choice& choice);
   bool camera_at(StampNs stamp_ns, bool settle, CameraModel& camera);
   /// False: it has to be waited for. The frame is dropped when `found` is false.
-  bool pose_at(const DepthImage& depth, StampNs stamp_ns, bool last_call, Pose& T_W_C, bool& found);
+  bool pose_at(StampNs stamp_ns, bool last_call, Pose& T_W_C, bool& found);
   std::optional<InputProblem> judge(Stream stream, StampNs stamp_ns);
   void drop_beyond(Stream stream, StampNs stamp_ns);
   StampNs horizon_ns() const;
@@ -155,8 +152,7 @@ class TimeSynchronizer {
 
   SynchronizerConfig config_;
   const TransformTree& transforms_;
-  Queue<DepthImage> depth_;
-  Queue<cv::Mat> segmentation_, color_;
+  Queue<cv::Mat> depth_, segmentation_, color_;
   Queue<CameraModel> infos_;
   std::optional<CameraModel> unstamped_info_;
   std::map<Stream, StampOrder> orders_;

@@ -50,9 +50,6 @@ class TransformTree {
   /// Forgets what is not static at these frames and at all that hang on them.
   void forget_moving(const std::vector<std::string>& frames);
 
-  /// Whether something says where the frame is.
-  bool knows(const std::string& frame) const { return find(frame) != nullptr; }
-
   /// The frames from `source` up to the one before `target`, as far as they are known.
   std::vector<std::string> chain(const std::string& target, const std::string& source) const;
 

@@ -85,8 +85,8 @@ class RecordingReader {
   }
 
   /// rosbag2 can compress messages one by one (no CDR begins like zstd): the message becomes what
-  /// it was. False, with a problem, when that cannot be done.
-  bool unpack(RecordedMessage& message);
+  /// it was. False, with a problem that begins with `name`, when that cannot be done.
+  bool unpack(RecordedMessage& message, const std::string& name);
 
  private:
   static constexpr std::size_t kLargestMessage = 256u << 20;
