@@ -65,8 +65,8 @@ export class Health {
       if (bad) alarms.push(`<b>${escaped(node.name)}</b>: ${escaped(why)}.`);
       if (node.condition === "present") {
         for (const robot of node.robots) {
-          const waits = robot.waiting_for;
-          if (waits && !waits.includes("wait for its next frame")) alarms.push(`<b>${escaped(robot.name)}</b>: ${escaped(waits)}.`);
+          const waits = robot.waiting_for.includes("wait for its next frame") ? "" : robot.waiting_for;  // that is no fault of its own
+          if (waits) alarms.push(`<b>${escaped(robot.name)}</b>: ${escaped(waits)}.`);
           robots.push(`<span class="chip ${!robot.present ? "" : waits ? "warn" : "good"}" title="${escaped(`${robot.frames} frames, ${robot.dropped} dropped. ${waits}`)}">${escaped(robot.name)}</span>`);
         }
       }

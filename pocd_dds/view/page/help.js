@@ -26,7 +26,7 @@ export function helpHtml() {
     <tr><td>${swatch("moved")} ${swatch("moved", true)}</td><td>moved: where it is, and dashed where it was, with an arrow</td></tr>
     <tr><td>${swatch("removed", true)}</td><td>removed: where it was</td></tr>
     <tr><td>${swatch("unknown", true)}</td><td>not looked at since the node was started again; the map there is striped</td></tr>
-    <tr><td>${swatch("good")}</td><td>a robot's camera and what it can see</td></tr></table>
+    <tr><td>${swatch("robot")}</td><td>a robot's camera and what it can see</td></tr></table>
     <p>Surfaces and boxes have the colour of E[v], the probability that the object stays where it is: red moves, green stays.</p>
     <form method="dialog"><button class="kind">Close</button></form>`;
 }

@@ -29,6 +29,7 @@ const surface = new Surface(stage.scene, (list) => connection.wish("want", list)
 const layers = { now: new ObjectLayer(stage.scene), before: new ObjectLayer(stage.scene) };
 layers.before.group.visible = false;
 const robots = new Robots(stage.scene);
+const grid = new Lines(stage.scene);
 const tape = new Lines(stage.scene, true);
 const labels = new Labels($("labels"), stage);
 const panel = new Panel(store, { select, flyTo, inView });
@@ -38,7 +39,7 @@ const time = new TimeLine(panel.events, timeChanged);
 function use(piece) {
   if (piece.kind !== "json") {
     surface.use(piece);
-    stage.ask();
+    stage.askSoon();
     return;
   }
   const json = piece.json;
@@ -147,18 +148,19 @@ function drawObjects(now) {
 function pose(json) { return [json.position[0], json.position[1], json.position[2]]; }
 
 stage.resizers.push((width, height, pixels) => {
-  for (const one of [layers.now, layers.before, robots.lines, tape]) one.resize(width, height, pixels);
+  for (const one of [layers.now, layers.before, robots.lines, grid, tape]) one.resize(width, height, pixels);
 });
 stage.before.push((now) => {
   if (!drawn) {
     drawObjects(now);
-    stage.ask();
+    if (drawn) stage.askSoon();
+    else stage.ask();  // a box glides
   }
-  if (robots.draw(theme, following)) stage.ask();
+  if (robots.draw(theme, following)) stage.askSoon();
   const followed = following && robots.find(following);
   if (followed && robots.moved) stage.follow(robots.moved.from, pose(followed));
   robots.moved = null;
-  if (surface.update(stage.camera.position, Math.max(60, 6 * stage.camera.position.distanceTo(stage.controls.target)))) stage.ask();
+  if (surface.update(stage.camera.position, Math.max(60, 6 * stage.camera.position.distanceTo(stage.controls.target)))) stage.askSoon();
   time.draw(theme);
   panel.update(time.range ? time.range[1] : 0);
   return false;
@@ -182,6 +184,7 @@ setInterval(() => {
   $("empty").hidden = Boolean(bounds) || store.objects.size > 0;
   health.show();
   if (!bounds) return;
+  drawGrid(bounds);
   if ((wantsFit && !stage.touched && !restored) && !(fitted && fitted.containsBox(bounds))) {
     stage.fit(bounds, !fitted);
     fitted = bounds.clone().expandByScalar(0.3);
@@ -195,6 +198,23 @@ setInterval(() => {
     stage.ask();
   }
 }, 250);
+
+/** Metres on the ground: every one of a room, every ten of a hall. */
+let gridded = "";
+function drawGrid(bounds) {
+  const step = Math.max(bounds.max.x - bounds.min.x, bounds.max.y - bounds.min.y) > 60 ? 10 : 1;
+  const [x0, y0] = [bounds.min.x, bounds.min.y].map((v) => step * Math.floor(v / step));
+  const [x1, y1] = [bounds.max.x, bounds.max.y].map((v) => step * Math.ceil(v / step));
+  const wanted = `${x0},${y0},${x1},${y1},${theme.grid}`;
+  if (wanted === gridded) return;
+  gridded = wanted;
+  grid.begin();
+  const rgb = rgbOf(theme.grid);
+  for (let x = x0; x <= x1; x += step) grid.add([x, y0, 0], [x, y1, 0], rgb, x % (5 * step) === 0 ? 1.6 : 1, 0.8);
+  for (let y = y0; y <= y1; y += step) grid.add([x0, y, 0], [x1, y, 0], rgb, y % (5 * step) === 0 ? 1.6 : 1, 0.8);
+  grid.end();
+  stage.ask();
+}
 
 function setTheme(name) {
   theme = themes[name];

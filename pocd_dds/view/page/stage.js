@@ -4,6 +4,7 @@ import { OrbitControls } from "./three/examples/jsm/controls/OrbitControls.js";
 
 THREE.Object3D.DefaultUp.set(0, 0, 1);
 const kFlight = 650;  // [ms]
+const kDataFrame = 80;  // between frames that show new data only [ms]
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 export class Stage {
@@ -27,6 +28,8 @@ export class Stage {
     this.touched = false;  // a person has moved the camera
     this.split = false;
     this.asked = true;
+    this.askedSoon = false;
+    this.drawnAt = 0;
     this.before = [];      // called before a frame; true: another frame is wanted
     this.halves = [];      // called with "whole", "left" or "right" before that part is drawn
     this.after = [];
@@ -37,7 +40,10 @@ export class Stage {
     requestAnimationFrame((now) => this.frame(now));
   }
 
+  /** A frame as soon as there can be one: the camera moves. */
   ask() { this.asked = true; }
+  /** A frame soon: new data, of which a few pictures per second are enough. */
+  askSoon() { this.askedSoon = true; }
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
@@ -56,8 +62,11 @@ export class Stage {
     if (this.flight) this.fly(now);
     let more = false;
     for (const step of this.before) more = step(now) || more;
-    if (!this.asked && !more) return;
+    const due = this.askedSoon && now - this.drawnAt > kDataFrame;
+    if (!this.asked && !more && !due) return;
     this.asked = more;
+    this.askedSoon = false;
+    this.drawnAt = now;
     this.camera.aspect = this.partWidth / this.height;
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
