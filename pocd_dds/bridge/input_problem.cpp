@@ -1,6 +1,6 @@
 #include "pocd_dds/bridge/input_problem.hpp"
 
-#include <spdlog/spdlog.h>
+#include "pocd_dds/entities/bus_log.hpp"
 
 namespace pocd::dds {
 
@@ -17,7 +17,7 @@ void ProblemCounter::count(const std::string& topic, const std::string& reason,
   Seen& seen = entry_of(topic, reason);
   if (seen.count == 0) {
     seen.detail = detail;
-    spdlog::warn("{}: {}: {} (logged once, counted)", topic, reason, detail);
+    log_warning("{}: {}: {} (logged once, counted)", topic, reason, detail);
   }
   seen.count += times;
 }
@@ -32,6 +32,7 @@ void ProblemCounter::count_incompatible(RawReader& reader) {
 
 void ProblemCounter::count_damaged(RawReader& reader) {
   count(reader.topic(), "damaged", "a message that cannot be read", reader.take_damaged());
+  count(reader.topic(), "other_idl", reader.misread_from(), reader.take_misread());
 }
 
 std::vector<ProblemCounter::Entry> ProblemCounter::entries() const {

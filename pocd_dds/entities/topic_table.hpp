@@ -49,8 +49,13 @@ inline constexpr TopicSpec kOdometry{"rt/{robot}/odom", "nav_msgs::msg::dds_::Od
                                      Direction::kIn, false, best_effort(20)};
 inline constexpr TopicSpec kTf{"rt/tf", "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn, false,
                                best_effort(100)};
-inline constexpr TopicSpec kTfStatic{"rt/tf_static", "tf2_msgs::msg::dds_::TFMessage_",
-                                     Direction::kIn, false, latched(100)};
+// Every broadcaster says its transforms once and for all: not one sample may make room for another.
+// A reader that is full has the others sent again when it has been emptied.
+inline constexpr TopicSpec kTfStatic{"rt/tf_static",
+                                     "tf2_msgs::msg::dds_::TFMessage_",
+                                     Direction::kIn,
+                                     false,
+                                     {true, true, 0, 10000, 0, false, 0}};
 inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kBoth,
                                   false, reliable(1)};
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "diagnostic_msgsPubSubTypes.h"
+#include "full_writers.hpp"
 #include "map_msgsPubSubTypes.h"
 #include "map_source.hpp"
 #include "nav_msgsPubSubTypes.h"
@@ -309,22 +310,7 @@ TEST(RosOutputs, WhatIsRefusedIsSentAgain) {
   talk_over_the_bus();  // the short cut within a process loses what the reader has no room for
   const TemporaryFolder folder;
   const auto profiles = folder.path() / "profiles.xml";
-  {
-    std::ofstream file(profiles);
-    file << R"(<?xml version="1.0" encoding="UTF-8" ?>
-<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">)";
-    for (const char* topic : {"rt/pocd/map", "rt/pocd/objects/markers"}) {
-      file << "<data_writer profile_name=\"" << topic << R"("><topic>
-  <historyQos><kind>KEEP_ALL</kind></historyQos><resourceLimitsQos><max_samples>1</max_samples>
-  <max_instances>1</max_instances><max_samples_per_instance>1</max_samples_per_instance>
-  <allocated_samples>0</allocated_samples></resourceLimitsQos></topic>
-  <qos><reliability><kind>RELIABLE</kind><max_blocking_time><nanosec>1000000</nanosec>
-  </max_blocking_time></reliability><durability><kind>TRANSIENT_LOCAL</kind></durability></qos>
-  <times><heartbeatPeriod><nanosec>20000000</nanosec></heartbeatPeriod></times>
-  <historyMemoryPolicy>DYNAMIC</historyMemoryPolicy></data_writer>)";
-    }
-    file << "</profiles>";
-  }
+  write_one_sample_profiles(profiles, {"rt/pocd/map", "rt/pocd/objects/markers"});
   dds::RosOutputConfig rates;
   rates.markers_hz = rates.occupancy_hz = 1.0;
   rates.obstacles_hz = rates.surface_hz = 0.0;
@@ -388,6 +374,84 @@ TEST(RosOutputs, WhatIsRefusedIsSentAgain) {
            markers == std::set<std::int32_t>{1};
   })) << known(grid.data())
       << " of " << known(projection.grid().cells) << " cells, " << markers.size() << " markers";
+}
+
+// A tile that cannot be decoded: the topics made of it say so, the others and the caller go on.
+TEST(RosOutputs, WhatCannotBeMadeHarmsNobody) {
+  dds::RosOutputConfig rates;
+  rates.markers_hz = rates.occupancy_hz = rates.surface_hz = 1.0;
+  rates.obstacles_hz = 0.0;
+  OutputsInSimulatedTime node(rates);
+  dds::Wakeup wakeup;
+  dds::Reader<nav_msgs::msg::OccupancyGridPubSubType> grids(node.bus, dds::topics::kOccupancy,
+                                                            wakeup);
+  dds::Reader<sensor_msgs::msg::PointCloud2PubSubType> clouds(node.bus, dds::topics::kSurface,
+                                                              wakeup);
+  dds::Reader<visualization_msgs::msg::MarkerArrayPubSubType> arrays(
+      node.bus, dds::topics::kMarkers, wakeup);
+  ASSERT_TRUE(eventually([&] {
+    return grids.matched() > 0 && clouds.matched() > 0 && arrays.matched() > 0;
+  }));
+  const TileKey broken{0, 0, 0};
+  node.tiles[broken] = MapTile{broken, 1, TilePayload::Bytes{1, 2, 3}};
+  node.changed_tiles.insert(broken);
+  node.put(1);
+  EXPECT_NO_THROW(node.at(1.0));
+  EXPECT_EQ(node.outputs.broken(),
+            (std::map<std::string, std::uint64_t>{{"rt/pocd/map", 1}, {"rt/pocd/surface", 1}}));
+  dds::SampleMeta meta;
+  visualization_msgs::msg::MarkerArray array;
+  EXPECT_TRUE(arrays.take(array, meta)) << "is made of objects";
+
+  // What is good again is published again.
+  TsdfMap map{TsdfConfig{}};
+  Random random(3);
+  fill_block(map, {0, 0, 1}, random);
+  MapPublisher publisher(1, TsdfConfig{});
+  publisher.take_over(*publisher.make_step(map));
+  node.tiles = publisher.tiles();
+  for (const auto& [key, tile] : node.tiles) node.changed_tiles.insert(key);
+  node.changed_tiles.insert(broken);
+  node.at(2.5);
+  nav_msgs::msg::OccupancyGrid grid;
+  sensor_msgs::msg::PointCloud2 cloud;
+  EXPECT_TRUE(grids.take(grid, meta));
+  EXPECT_TRUE(clouds.take(cloud, meta));
+  EXPECT_EQ(node.outputs.broken().size(), 2u);
+}
+
+// A cloud has no parts, so its rate is kept by the time between clouds.
+TEST(RosOutputs, LargeOnesLeaveAtTheirRate) {
+  dds::RosOutputConfig rates;
+  rates.surface_hz = 20.0;
+  rates.occupancy_hz = rates.markers_hz = rates.obstacles_hz = 0.0;
+  rates.rate_mb_s = 0.01;
+  OutputsInSimulatedTime node(rates);
+  dds::Wakeup wakeup;
+  dds::Reader<sensor_msgs::msg::PointCloud2PubSubType> clouds(node.bus, dds::topics::kSurface,
+                                                              wakeup);
+  ASSERT_TRUE(eventually([&] { return clouds.matched() > 0; }));
+  TsdfMap map{TsdfConfig{}};
+  MapPublisher publisher(1, TsdfConfig{});
+  Random random(3);
+  std::size_t bytes = 0;
+  int written = 0;
+  const auto start = std::chrono::steady_clock::now();
+  for (int step = 0; step < 20; ++step) {
+    for (int i = 0; i < 4; ++i) fill_block(map, {step, i, 1}, random);
+    publisher.take_over(*publisher.make_step(map));
+    node.tiles = publisher.tiles();
+    for (const auto& [key, tile] : node.tiles) node.changed_tiles.insert(key);
+    node.at(1.0 + step);
+    sensor_msgs::msg::PointCloud2 cloud;
+    dds::SampleMeta meta;
+    while (clouds.take(cloud, meta)) bytes += cloud.data().size(), ++written;
+  }
+  const double elapsed_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  ASSERT_GT(bytes, 10'000u) << "more than a second's worth at once";
+  // The last one may overdraw.
+  EXPECT_LE(written, 1 + static_cast<int>(elapsed_s)) << bytes << " bytes in " << elapsed_s << " s";
 }
 
 TEST(RosOutputs, EachCanBeSwitchedOff) {
