@@ -1,8 +1,8 @@
 #include "pocd_dds/entities/participant.hpp"
 
+#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -72,8 +72,10 @@ void apply(const Delivery& delivery, Qos& qos) {
   // The defaults, 10 instances and 5000 samples, make write() fail beyond them. 0 means no bound.
   qos.resource_limits().max_instances = delivery.max_instances;
   qos.resource_limits().max_samples = delivery.max_samples;
-  qos.resource_limits().max_samples_per_instance =
-      delivery.keep_last > 0 ? delivery.keep_last : delivery.max_samples;
+  qos.resource_limits().max_samples_per_instance = delivery.keep_last > 0 ? delivery.keep_last
+                                                   : delivery.max_samples_per_instance > 0
+                                                       ? delivery.max_samples_per_instance
+                                                       : delivery.max_samples;
   qos.resource_limits().allocated_samples = 0;
   if (delivery.deadline_s > 0.0) {
     qos.deadline().period = eprosima::fastrtps::Duration_t(delivery.deadline_s);
@@ -96,8 +98,9 @@ void lift_limits(const Delivery& delivery, Qos& qos) {
   }
 }
 
-/// With a discovery server (ROS_DISCOVERY_SERVER) a client is told of topics that it has itself, and
-/// of no other. Whoever looks at discovery, to find robots by their topics, is to be told of all.
+/// With a discovery server (ROS_DISCOVERY_SERVER) a client is told of topics that it has itself,
+/// and of no other. Whoever looks at discovery, to find robots by their topics, is to be told of
+/// all.
 void follow_discovery_server(DomainParticipantQos& qos) {
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   if (discovery.discoveryProtocol != eprosima::fastrtps::rtps::DiscoveryProtocol_t::SIMPLE) return;

@@ -14,6 +14,9 @@ struct Delivery {
   int max_instances = 0;    ///< of keyed topics; 0: not bounded
   bool background = false;  ///< sent, and sent again, by a thread of its own
   double deadline_s = 0.0;  ///< 0: none
+  /// Of keyed topics that keep all: 0: not bounded. Fast DDS makes no reader whose max_samples is
+  /// less than this times max_instances.
+  int max_samples_per_instance = 0;
 };
 
 enum class Direction { kIn, kOut, kBoth };

@@ -24,11 +24,14 @@ constexpr int kMost = 1000;  // samples of a topic in one turn, so that no peer 
 
 /// With the last sample only, a dispose would take the place of a state that was not read yet, and
 /// a state that of the one before. What finds no room is sent again when there is some.
-dds::Delivery every_sample() {
+dds::Delivery every_sample(std::size_t most_objects) {
+  constexpr int kPerObject = 8, kBeyond = 1000;  // those beyond are counted
   dds::Delivery delivery = dds::topics::kObjects.delivery;
   delivery.keep_last = 0;
-  delivery.max_samples = 10000;
-  delivery.max_instances = 0;
+  delivery.max_instances =
+      static_cast<int>(std::min<std::size_t>(most_objects, 10000000)) + kBeyond;
+  delivery.max_samples_per_instance = kPerObject;
+  delivery.max_samples = kPerObject * delivery.max_instances;
   return delivery;
 }
 
@@ -39,8 +42,8 @@ struct ObjectWatch::Impl {
       : options(given),
         participant(dds::shared_participant(
             {given.domain, given.profiles_file, given.name, given.security_folder})),
-        states(participant, dds::topics::kObjects, dds::topics::kObjects.name, every_sample(),
-               wakeup),
+        states(participant, dds::topics::kObjects, dds::topics::kObjects.name,
+               every_sample(given.most_objects), wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         callbacks(given.callbacks, [this](const std::string& text) { tell(text); }),

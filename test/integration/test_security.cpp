@@ -127,7 +127,7 @@ TEST(Security, OthersRefuseAWriterOutsideOfItsRole) {
   const Authority authority({"subscriber", "component", "robot:robot1"});
   const auto governance = read_text(source("launch_scripts/security/governance.xml"));
   std::string lenient = governance;
-  for (const std::string& check : {"read", "write"}) {
+  for (const std::string check : {"read", "write"}) {
     const std::string tag = "<enable_" + check + "_access_control>true";
     const std::size_t at = lenient.find(tag);
     ASSERT_NE(at, std::string::npos);
