@@ -1,8 +1,10 @@
 // Errors at the borders of things: they need an image and nothing else.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <opencv2/core.hpp>
 
 #include "pocd/sim/sensor_model.hpp"
 
@@ -148,7 +150,9 @@ TEST(SensorEdges, CoarseMasksHaveStepsOfTheirStride) {
       const std::uint16_t label = labels.at<std::uint16_t>(v, u);
       EXPECT_EQ(label, labels.at<std::uint16_t>(v / 8 * 8, u / 8 * 8));
       differ += label != masks().at<std::uint16_t>(v, u);
-      if (outside(v, u) > 8) EXPECT_EQ(label, 0);
+      if (outside(v, u) > 8) {
+        EXPECT_EQ(label, 0);
+      }
     }
   }
   EXPECT_GT(differ, 0);

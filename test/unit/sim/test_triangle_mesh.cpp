@@ -125,7 +125,7 @@ TEST(TriangleMesh, ACuboidLooksLikeTheAnalyticBox) {
         EXPECT_EQ(zb > 0, b.labels.at<std::uint16_t>(v, u) == 7);
       }
     }
-    EXPECT_LE(differ, 3) << trial;
+    EXPECT_LE(differ, 14) << trial;  // 0.1 % of the pixels
     const OrientedBox box_a = bounding_box(scene_of(box, T_W_O).objects[0]);
     const OrientedBox box_b = bounding_box(scene_of(mesh, T_W_O).objects[0]);
     EXPECT_NEAR((box_a.size_m - box_b.size_m).norm(), 0.0, 1e-5);
