@@ -29,7 +29,7 @@ double geometric_change(const LibraryObject& object, const Observation& observat
                         const Sighting& sighting, const Match& match, const OrganizedCloud& cloud,
                         const ChangeConfig& config) {
   double delta_m = 0.0;
-  if (config.measure == "ray_traced") {
+  if (config.measure == ChangeMeasure::kRayTraced) {
     const Eigen::Isometry3f T_C_W = cloud.T_W_C.inverse().cast<float>();
     Points object_C, observation_C;
     for (const Surfel& s : object.model.surfels()) object_C.push_back(T_C_W * s.point_W);

@@ -2,13 +2,15 @@
 
 #include <time.h>
 
+#include <cmath>
 #include <cstdio>
-#include <set>
 #include <string>
 
 #include "frame_clock.hpp"
 #include "object_tracker.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/recent_map.hpp"
+#include "pocd/config/check_config.hpp"
 
 namespace pocd {
 namespace {
@@ -39,12 +41,23 @@ class StageClock {
   double wall_, cpu_;
 };
 
-std::string behind_text(const Frame& frame, StampNs newest_ns) {
-  char text[64];
-  std::snprintf(text, sizeof(text), "stamp is %.1f s behind the newest",
-                static_cast<double>(newest_ns - frame.stamp_ns) * 1e-9);
-  return (frame.robot.empty() ? "" : frame.robot + ": ") + text;
+std::string prefix(const Frame& frame) {
+  return frame.robot.empty() ? "" : frame.robot + ": ";
 }
+
+std::string off_text(const Frame& frame, StampNs newest_ns) {
+  const double ahead_s = (static_cast<double>(frame.stamp_ns) - static_cast<double>(newest_ns)) * 1e-9;
+  char text[80];
+  std::snprintf(text, sizeof(text), "stamp is %.1f s %s the newest", std::abs(ahead_s),
+                ahead_s > 0.0 ? "ahead of" : "behind");
+  return prefix(frame) + text;
+}
+
+/// What is known of one robot.
+struct RobotState {
+  GroundModel ground;
+  std::optional<StampNs> mask_ns;  ///< of its last frame with a segmentation image
+};
 
 }  // namespace
 
@@ -62,10 +75,9 @@ struct PocdPipeline::Impl {
   ThreadPool pool;
   FrameClock frame_clock;
   PoseGate pose_gate;
-  GroundModel ground;
+  RecentMap<RobotState> robots;
   ObjectTracker tracker;
   TsdfMap map;
-  std::set<std::string> robots_with_masks;
   // Memory of a frame, kept between frames.
   OrganizedCloud cloud;
   PlaneSegmentation planes;
@@ -75,11 +87,8 @@ struct PocdPipeline::Impl {
   std::vector<std::uint32_t> owners;
   bool mask_missing = false;
 
-  /// Whether a robot that delivers masks did not this time.
-  bool mask_is_missing(const Frame& frame) {
-    if (!frame.labels.empty()) robots_with_masks.insert(frame.robot);
-    return frame.labels.empty() && robots_with_masks.count(frame.robot) > 0;
-  }
+  /// Whether a robot that delivers masks did not this time. One that has not for long does no more.
+  bool mask_is_missing(const Frame& frame, RobotState& robot, FrameResult& result) const;
 
   /// Before anything changes: a frame that is refused later would leave half of its traces.
   void check(const Frame& frame) const;
@@ -87,7 +96,10 @@ struct PocdPipeline::Impl {
   void integrate(const Frame& frame);
 };
 
-PocdPipeline::PocdPipeline(const PipelineConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+PocdPipeline::PocdPipeline(const PipelineConfig& config) {
+  check_config(config, "pipeline");
+  impl_ = std::make_unique<Impl>(config);
+}
 PocdPipeline::~PocdPipeline() = default;
 
 FrameResult PocdPipeline::process_frame(const Frame& frame) {
@@ -95,13 +107,13 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   p.check(frame);
   FrameResult result;
   const StampNs newest_ns = p.frame_clock.newest_ns();
-  const FrameClock::Verdict verdict = p.frame_clock.judge(frame.stamp_ns);
+  const FrameClock::Verdict verdict = p.frame_clock.judge(frame.robot, frame.stamp_ns);
   if (verdict != FrameClock::Verdict::kGoesOn) {
-    const bool behind = verdict == FrameClock::Verdict::kBehind;
-    result.warnings.push_back(behind_text(frame, newest_ns) +
-                              (behind ? ": frame not used" : ": clocks were set back, goes on"));
-    result.accepted = !behind;
-    if (behind) return result;
+    result.accepted = verdict == FrameClock::Verdict::kSetBack;
+    result.warnings.push_back(
+        off_text(frame, newest_ns) +
+        (result.accepted ? ": clocks were set back, goes on" : ": frame not used"));
+    if (!result.accepted) return result;
     p.tracker.set_clock_back(frame.stamp_ns);
   }
   if (const auto reason = p.pose_gate.refuse(frame)) {
@@ -126,14 +138,15 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   clock.done("pose");
   segment_planes(p.cloud, segmentation, noise, p.planes);
   vote_planes(p.planes, segmentation.majority_share, p.cloud);
-  p.ground.update(p.planes, segmentation, noise, p.cloud);
+  RobotState& robot = p.robots.at(frame.robot, frame.stamp_ns).first;
+  robot.ground.update(p.planes, segmentation, noise, p.cloud);
   clock.done("clean");
-  p.mask_missing = p.mask_is_missing(frame);
+  p.mask_missing = p.mask_is_missing(frame, robot, result);
   if (p.mask_missing) {
     // What things are would be a guess: they may be seen to be gone, but nothing is learnt of them.
     p.observations.list.clear();
     p.observations.observation_of.assign(p.cloud.size(), Observations::kNone);
-    result.warnings.push_back((frame.robot.empty() ? "" : frame.robot + ": ") +
+    result.warnings.push_back(prefix(frame) +
                               "no segmentation image: nothing is added, matched or mapped");
   } else {
     extract_observations(segmentation, noise, p.config.map.voxel_size_m, p.planes, p.cloud,
@@ -141,7 +154,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   }
   clock.done("cluster");
   p.field.update(p.cloud);
-  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation,
+  p.tracker.update(frame, p.cloud, p.field, p.observations, robot.ground, p.map, p.owner_of_observation,
                    result);
   clock.done("objects");
   p.integrate(placed);
@@ -151,8 +164,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
 }
 
 void PocdPipeline::Impl::check(const Frame& frame) const {
-  const std::string source =
-      (frame.robot.empty() ? "" : frame.robot + ": ") + "frame " + std::to_string(frame.sequence);
+  const std::string source = prefix(frame) + "frame " + std::to_string(frame.sequence);
   validate_frame(frame, source);
   const int stride = config.segmentation.stride;
   if (frame.camera.width < stride || frame.camera.height < stride) {
@@ -161,6 +173,23 @@ void PocdPipeline::Impl::check(const Frame& frame) const {
                      ", smaller than segmentation.stride = " + std::to_string(stride));
   }
   map.check_view(frame);
+}
+
+bool PocdPipeline::Impl::mask_is_missing(const Frame& frame, RobotState& robot,
+                                         FrameResult& result) const {
+  if (!frame.labels.empty()) {
+    robot.mask_ns = frame.stamp_ns;
+    return false;
+  }
+  if (!robot.mask_ns) return false;
+  const double seconds = static_cast<double>(frame.stamp_ns - *robot.mask_ns) * 1e-9;
+  if (std::abs(seconds) <= config.mask_timeout_s) return true;
+  robot.mask_ns.reset();
+  char text[100];
+  std::snprintf(text, sizeof(text), "no segmentation image for %.0f s: mapped without from now on",
+                std::abs(seconds));
+  result.warnings.push_back(prefix(frame) + text);
+  return false;
 }
 
 void PocdPipeline::Impl::paint_owners() {

@@ -50,8 +50,7 @@ void PoseGate::accept(Track& track, const Pose& pose, StampNs stamp_ns) const {
 }
 
 std::optional<std::string> PoseGate::refuse(const Frame& frame) {
-  const auto [it, fresh] = tracks_.try_emplace(frame.robot);
-  Track& track = it->second;
+  const auto [track, fresh] = tracks_.at(frame.robot, frame.stamp_ns);
   double jump_m = 0.0, turn_deg = 0.0;
   bool ok = fresh || (plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,
                                 jump_m, turn_deg) &&

@@ -113,7 +113,7 @@ TEST(GeometricChange, SmallStepsOfARealBox) {
 
 TEST(GeometricChange, RayTracedIsThePublishedMeasureOfTheSameClouds) {
   ChangeConfig config;
-  config.measure = "ray_traced";
+  config.measure = ChangeMeasure::kRayTraced;
   const Pair pair =
       object_and_observation(solid(kBoxClass, {0, 2.3}, kSize), solid(kBoxClass, {0, 2.2}, kSize));
   Match match;
@@ -141,7 +141,7 @@ TEST(GeometricChange, RayTracedIsThePublishedMeasureOfTheSameClouds) {
 
 TEST(GeometricChange, RayTracedWithoutACommonVoxelIsTheDisplacement) {
   ChangeConfig config;
-  config.measure = "ray_traced";
+  config.measure = ChangeMeasure::kRayTraced;
   config.tsdf_truncation_m = 0.1;
   const Pair pair = object_and_observation(solid(kBoxClass, {-0.8, 2.3}, kSize),
                                            solid(kBoxClass, {0.8, 2.3}, kSize));

@@ -1,14 +1,14 @@
 // Parameters of measuring geometric change.
 #pragma once
 
-#include <string>
-
-#include "pocd/config/describe.hpp"
+#include "pocd/config/words.hpp"
 
 namespace pocd {
 
+enum class ChangeMeasure { kProjective, kRayTraced };
+
 struct ChangeConfig {
-  std::string measure = "projective";
+  ChangeMeasure measure = ChangeMeasure::kProjective;
   double lambda_diff = 1.6;
   double delta_max_m = 4.0;
   double tau_m = 0.20;
@@ -18,7 +18,9 @@ struct ChangeConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("measure", measure, Choices{{"projective", "ray_traced"}},
+    visit("measure", measure,
+          Words<ChangeMeasure>{{{ChangeMeasure::kProjective, "projective"},
+                                {ChangeMeasure::kRayTraced, "ray_traced"}}},
           "projective: median difference of depth over the object's points that the frame sees; "
           "ray_traced: mean difference of two TSDFs, as published.");
     visit("lambda_diff", lambda_diff, Range{0.0, 100.0}, "Scale of the ray-traced measure.");

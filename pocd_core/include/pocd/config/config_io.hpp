@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "pocd/config/check_config.hpp"
 #include "pocd/config/parameter_sink.hpp"
 
 namespace pocd {
 
 namespace config_detail {
 
-using ShowTo = std::function<void(ParameterSink&)>;
 void load(const ShowTo& show, const std::vector<std::filesystem::path>& files,
           const std::vector<std::string>& overrides, const std::string& option);
 std::string dump(const ShowTo& show);

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/config/words.hpp"
 
 namespace pocd {
 
@@ -75,6 +75,12 @@ class DescribeAdapter {
   }
   void operator()(const char* name, std::string& value, const Choices& choices, const char* doc) {
     sink_.choice(name, value, choices, doc);
+  }
+  template <class Enum>
+  void operator()(const char* name, Enum& value, const Words<Enum>& words, const char* doc) {
+    std::string word = words.word_of(value);
+    sink_.choice(name, word, words.choices(), doc);
+    value = words.value_of(word, value);
   }
   void operator()(const char* name, std::vector<std::string>& values, const char* doc) {
     sink_.texts(name, values, doc);

@@ -20,6 +20,7 @@ namespace pocd {
 
 struct PipelineConfig {
   int threads = 1;
+  double mask_timeout_s = 30.0;
   DepthNoise depth_noise;
   PoseGateConfig pose_gate;
   PoseRefinementConfig pose_refinement;
@@ -34,6 +35,10 @@ struct PipelineConfig {
   void describe(Visitor& visit) {
     visit("threads", threads, Range{1, 64},
           "Threads of the pipeline; results do not depend on it.");
+    visit("mask_timeout_s", mask_timeout_s, Range{0.0, 1e6},
+          "A robot that delivered segmentation images and delivers none for so long is mapped as one "
+          "that never did: its pixels get classes.default_class. Until then its frames only show "
+          "what is gone [s].");
     visit.group("depth_noise", depth_noise, "Noise of the depth camera.");
     visit.group("pose_gate", pose_gate, "Refusing frames with impossible poses.");
     visit.group("pose_refinement", pose_refinement, "Correcting poses by what stands still.");

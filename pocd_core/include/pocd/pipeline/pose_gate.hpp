@@ -1,10 +1,10 @@
 // Refuses frames whose pose cannot be true: a bad pose looks like a change of everything.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 
+#include "pocd/common/recent_map.hpp"
 #include "pocd/config/describe.hpp"
 #include "pocd/input/frame.hpp"
 
@@ -34,7 +34,8 @@ struct PoseGateConfig {
   }
 };
 
-/// One gate for all robots; keeps the last accepted pose of each. Not thread-safe.
+/// One gate for all robots; keeps the last accepted pose of each, for as long as the robot is heard of
+/// (RecentMap). Not thread-safe.
 class PoseGate {
  public:
   explicit PoseGate(const PoseGateConfig& config) : config_(config) {}
@@ -62,7 +63,7 @@ class PoseGate {
   void accept(Track& track, const Pose& pose, StampNs stamp_ns) const;
 
   PoseGateConfig config_;
-  std::map<std::string, Track> tracks_;
+  RecentMap<Track> tracks_;  // by robot
 };
 
 }  // namespace pocd
