@@ -50,7 +50,9 @@ void PoseGate::accept(Track& track, const Pose& pose, StampNs stamp_ns) const {
 }
 
 std::optional<std::string> PoseGate::refuse(const Frame& frame) {
-  const auto [track, fresh] = tracks_.at(frame.robot, frame.stamp_ns);
+  // No name has a zero byte: robot and camera cannot be mixed up.
+  const auto [track, fresh] =
+      tracks_.at(frame.robot + '\0' + frame.camera_frame, frame.stamp_ns);
   double jump_m = 0.0, turn_deg = 0.0;
   bool ok = fresh || (plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,
                                 jump_m, turn_deg) &&

@@ -99,7 +99,9 @@ TEST(RayTracedChange, GrowsWithNoise) {
 TEST(RayTracedChange, NothingInCommonIsNoMeasurement) {
   Random random(45);
   const Points here = wall(1.0, 0.0, 0.0, random);
-  EXPECT_FALSE(ray_traced_change(here, wall(1.6, 0.0, 0.0, random), 0.6, {}));
+  // Bands of 20 cm around each of two surfaces that lie 60 cm apart.
+  const RayTracedChangeOptions thin{0.05, 0.2, 1.6};
+  EXPECT_FALSE(ray_traced_change(here, wall(1.6, 0.0, 0.0, random), 0.6, thin));
   EXPECT_FALSE(ray_traced_change(here, {}, 0.0, {}));
   EXPECT_FALSE(ray_traced_change({}, here, 0.0, {}));
 }

@@ -46,6 +46,25 @@ TEST(PipelineRobots, ARobotWhoseMasksEndMapsAgain) {
   EXPECT_EQ(drive.process(frame).warnings.size(), 1u);
 }
 
+// Front and rear camera of one robot look from two places at once: neither is a jump.
+TEST(PipelineRobots, TwoCamerasOfARobotAreNoJumps) {
+  PoseGate gate{PoseGateConfig{}};
+  for (const bool named : {true, false}) {
+    int refused = 0;
+    for (int i = 0; i < 100; ++i) {
+      Frame frame;
+      frame.robot = named ? "named" : "nameless";
+      frame.stamp_ns = 1'000'000'000 + i * 33'000'000;
+      frame.T_W_C.translation().x() = 0.02 * i + (i % 2 ? 0.8 : 0.0);
+      frame.T_W_C.linear() =
+          Eigen::AngleAxisd(i % 2 ? M_PI : 0.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      if (named) frame.camera_frame = i % 2 ? "rear" : "front";
+      refused += gate.refuse(frame).has_value();
+    }
+    EXPECT_EQ(refused > 0, !named) << refused;
+  }
+}
+
 // One robot is half a metre lower, down a ramp, and sees no floor there: what lies below the other
 // robot's floor is not floor for that.
 TEST(PipelineRobots, EachRobotHasItsGround) {

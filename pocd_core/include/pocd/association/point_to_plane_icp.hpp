@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "pocd/association/association_config.hpp"
 #include "pocd/association/icp_target.hpp"
 
 namespace pocd {
@@ -16,7 +17,7 @@ enum class IcpFreedom {
 
 struct IcpOptions {
   IcpFreedom freedom = IcpFreedom::kYaw;
-  int max_iterations = 40;       ///< >= 1
+  int max_iterations = AssociationConfig{}.icp_iterations;  ///< >= 1
   double convergence_m = 5e-4;   ///< stop when a step moves the points by less (rms)
   double robust_scale_m = 0.05;  ///< Cauchy weight 1 / (1 + (residual / scale)^2)
   /// Smallest eigenvalue, relative to the weight of all points, of a direction that counts as

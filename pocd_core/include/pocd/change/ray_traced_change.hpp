@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "pocd/change/change_config.hpp"
 #include "pocd/common/types.hpp"
 
 namespace pocd {
@@ -14,8 +15,8 @@ struct RayTracedChangeOptions {
   double voxel_size_m = 0.05;  ///< > 0
   /// Half the thickness of the band around each surface, >= voxel_size_m. Surfaces farther apart
   /// than twice this along the ray share no voxel.
-  double truncation_m = 0.2;
-  double lambda_diff = 1.6;  ///< scale of the published measure, >= 0
+  double truncation_m = ChangeConfig{}.tsdf_truncation_m;
+  double lambda_diff = ChangeConfig{}.lambda_diff;  ///< scale of the published measure, >= 0
 };
 
 struct RayTracedChange {

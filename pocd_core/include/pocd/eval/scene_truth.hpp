@@ -11,8 +11,8 @@
 namespace pocd {
 
 struct SceneTruthOptions {
-  double map_voxel_m = 0.05;
-  double max_depth_m = 3.0;
+  double map_voxel_m = TsdfConfig{}.voxel_size_m;
+  double max_depth_m = TsdfConfig{}.max_depth_m;
   /// Of the frames of the last visit for the observed region and the visible surface; counts of the
   /// region are multiplied by it.
   int frame_stride = 3;

@@ -8,19 +8,21 @@
 #include <vector>
 
 #include "pocd/eval/observed_region.hpp"
+#include "pocd/map/tsdf_map.hpp"
 
 namespace pocd {
 
 struct VoxelMetricsConfig {
   double voxel_size_m = 0.2;  ///< voxels that are compared (paper: 20 cm TorWIC, 6 cm ToyCar)
-  double map_voxel_m = 0.05;  ///< of the maps; voxel_size_m is a multiple
+  double map_voxel_m = TsdfConfig{}.voxel_size_m;  ///< of the maps; voxel_size_m is a multiple
   /// Voxels begin at multiples of voxel_size_m plus this; a multiple of map_voxel_m. Walls like to
   /// stand at round coordinates, where noise alone would decide which of two voxels they are in.
-  double offset_m = 0.05;
+  double offset_m = TsdfConfig{}.voxel_size_m;
   /// Surface below (the floor) and above is not judged.
   double min_height_m = 0.1, max_height_m = 4.0;
   int min_points = 3;         ///< surface points that make a voxel occupied
-  double tolerance_m = 0.05;  ///< between a surface and the truth; one voxel of the map
+  /// Between a surface and the truth; one voxel of the map.
+  double tolerance_m = TsdfConfig{}.voxel_size_m;
   /// Frames of the last visit that must have seen, or seen through, a voxel for it to be judged.
   int min_frames = 3;
 };

@@ -16,6 +16,8 @@ struct Frame {
   std::uint64_t sequence = 0;
   /// Namespace of the robot that saw it; "" for a single data set.
   std::string robot;
+  /// Which of the robot's cameras took it: its frame in the transforms; "" where there is only one.
+  std::string camera_frame;
   CameraModel camera;
   Pose T_W_C = Pose::Identity();
   /// CV_32FC1 [m]; 0 or NaN = no return. make_frame converts from millimetres.

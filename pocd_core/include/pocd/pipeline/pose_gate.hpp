@@ -34,8 +34,8 @@ struct PoseGateConfig {
   }
 };
 
-/// One gate for all robots; keeps the last accepted pose of each, for as long as the robot is heard of
-/// (RecentMap). Not thread-safe.
+/// One gate for all robots; keeps the last accepted pose of each of their cameras, for as long as the
+/// camera is heard of (RecentMap). Not thread-safe.
 class PoseGate {
  public:
   explicit PoseGate(const PoseGateConfig& config) : config_(config) {}
@@ -63,7 +63,7 @@ class PoseGate {
   void accept(Track& track, const Pose& pose, StampNs stamp_ns) const;
 
   PoseGateConfig config_;
-  RecentMap<Track> tracks_;  // by robot
+  RecentMap<Track> tracks_;  // by robot and camera
 };
 
 }  // namespace pocd

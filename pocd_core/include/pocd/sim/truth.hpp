@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pocd/common/thread_pool.hpp"
+#include "pocd/map/tsdf_map.hpp"
 #include "pocd/sim/scenario.hpp"
 
 namespace pocd {
@@ -45,8 +46,8 @@ struct SurfaceVoxel {
 };
 
 struct VisibleSurfaceOptions {
-  double voxel_size_m = 0.05;
-  double max_depth_m = 3.0;
+  double voxel_size_m = TsdfConfig{}.voxel_size_m;
+  double max_depth_m = TsdfConfig{}.max_depth_m;
   int frame_stride = 1;          ///< uses every n-th frame of each robot
   bool include_fixtures = true;  ///< floor and walls
 };

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "pocd/config/describe.hpp"
+#include "pocd/state/object_state.hpp"
 
 namespace pocd {
 
 struct StateConfig {
-  double initial_stationarity = 0.67;
-  double initial_count = 3.0;
-  double initial_sigma_m = 0.5;
+  double initial_stationarity = kInitialStationarity;
+  double initial_count = kInitialCount;
+  double initial_sigma_m = kInitialSigma_m;
   double max_stationarity = 0.9999;
   double max_count = 12.0;
   double min_sigma_share = 0.5;
