@@ -10,7 +10,8 @@
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd/input/pose_quaternion.hpp"
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
+#include "pocd/sim/open_source.hpp"
 #include "pocd/map/map_delta.hpp"
 #include "pocd/map/mesh.hpp"
 #include "pocd/output/result_csv.hpp"
@@ -82,7 +83,7 @@ void count(const std::vector<ObjectEvent>& events, RunSummary& summary) {
 
 void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary,
                  std::ostream& log) {
-  const std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
+  const std::unique_ptr<DatasetReader> reader = open_source(options.dataset);
   EventsCsv events(options.output / "events.csv");
   TimingCsv timing(options.output / "timing.csv");
   Progress progress(options.show_progress, reader->size());

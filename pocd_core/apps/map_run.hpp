@@ -7,7 +7,7 @@
 #include <iosfwd>
 #include <optional>
 
-#include "pocd/config/run_summary.hpp"
+#include "pocd/output/run_summary.hpp"
 #include "pocd/datasets/dataset_reader.hpp"
 
 namespace pocd {

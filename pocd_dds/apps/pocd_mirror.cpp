@@ -5,7 +5,7 @@
 #include <map>
 
 #include "apps/common.hpp"
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
 #include "pocd/map/mesh.hpp"
 #include "pocd/output/result_csv.hpp"
 #include "pocd_dds/map_mirror.hpp"

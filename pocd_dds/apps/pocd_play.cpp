@@ -2,7 +2,7 @@
 #include <set>
 
 #include "apps/common.hpp"
-#include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/datasets/dataset_options_cli.hpp"
 #include "pocd_dds/play/player.hpp"
 #include "pocd_dds/recording/replayer.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "pocd/pipeline/frame_result.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_msgs.h"
 

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string_view>
 
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
 
 namespace pocd::dds {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "nav_msgsPubSubTypes.h"
 #include "pocd/common/check.hpp"
+#include "pocd/sim/open_source.hpp"
 #include "sensor_msgsPubSubTypes.h"
 #include "tf2_msgsPubSubTypes.h"
 
@@ -152,7 +153,7 @@ class Player::Robot {
 Player::Player(const PlayOptions& options)
     : options_(options),
       participant_(std::make_shared<Participant>(options.bus)),
-      reader_(open_dataset(options.dataset)) {
+      reader_(open_source(options.dataset)) {
   if (options.clock) {
     clock_ =
         std::make_unique<Writer<rosgraph_msgs::msg::ClockPubSubType>>(participant_, topics::kClock);

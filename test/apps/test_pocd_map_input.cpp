@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "pocd/config/config_io.hpp"
-#include "pocd/config/run_summary.hpp"
+#include "pocd/output/run_summary.hpp"
 #include "small_rgbd.hpp"
 
 namespace pocd {

@@ -9,7 +9,7 @@
 
 #include "bus_harness.hpp"
 #include "pocd/config/config_io.hpp"
-#include "pocd/config/run_summary.hpp"
+#include "pocd/output/run_summary.hpp"
 
 namespace pocd {
 

@@ -36,7 +36,7 @@ class Cyclone : public testing::Test {
     PipelineConfig config;
     load_config(config, {source("config/simulated.yaml")});
     dataset.classes = config.classes;
-    frames_ = write_frames(*open_dataset(dataset), folder / "frames");
+    frames_ = write_frames(*open_source(dataset), folder / "frames");
 
     const TestDomain domain;
     std::unique_ptr<Process> capture = start_capture(domain, folder / "capture.pcapng");

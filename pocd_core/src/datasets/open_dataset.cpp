@@ -1,10 +1,8 @@
 #include <cmath>
 
-#include "../sim/yaml_fields.hpp"
+#include "../config/yaml_fields.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
-#include "pocd/sim/scenario_yaml.hpp"
-#include "pocd/sim/sim_reader.hpp"
 
 namespace pocd {
 namespace {
@@ -51,22 +49,6 @@ std::unique_ptr<DatasetReader> open_pcd_with_camera_file(DatasetOptions options)
   return open_pcd(options);
 }
 
-std::unique_ptr<DatasetReader> open_sim(const DatasetOptions& options) {
-  Scenario scenario = load_run(options.inputs);
-  if (options.sensor == "perfect") {
-    scenario.sensor = SensorModel::perfect();
-  } else if (options.sensor == "stereo") {
-    scenario.sensor = SensorModel();
-  } else if (!options.sensor.empty()) {
-    throw InputError("sim: sensor '" + options.sensor + "' is unknown, one of: perfect, stereo");
-  }
-  SimReaderOptions reader;
-  reader.seed = options.seed;
-  reader.label_divisor = options.label_divisor;
-  reader.with_color = options.with_color;
-  return std::make_unique<SimReader>(std::move(scenario), reader);
-}
-
 }  // namespace
 
 std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options) {
@@ -79,10 +61,9 @@ std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options) {
   if (options.format == "toycar") return open_toycar(options);
   if (options.format == "rgbd") return open_rgbd(options);
   if (options.format == "pcd") return open_pcd_with_camera_file(options);
-  if (options.format == "sim") return open_sim(options);
   if (options.format == "mcap") return open_recorded(options);
   throw InputError("dataset: format '" + options.format +
-                   "' is unknown, one of: torwic, toycar, rgbd, pcd, sim, mcap");
+                   "' is unknown, one of: torwic, toycar, rgbd, pcd, mcap");
 }
 
 }  // namespace pocd

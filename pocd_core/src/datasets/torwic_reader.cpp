@@ -4,7 +4,7 @@
 #include "listed_reader.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
-#include "pocd/sim/scenario.hpp"
+#include "pocd/datasets/torwic_camera.hpp"
 #include "text_file.hpp"
 
 namespace pocd {
@@ -153,6 +153,19 @@ class TorwicReader : public ListedReader<Entry> {
 };
 
 }  // namespace
+
+CameraModel torwic_camera() {
+  return {640, 360, 461.0956115722656, 460.9181823730469, 325.4782409667969, 177.57662963867188};
+}
+
+CameraExtrinsics torwic_extrinsics() {
+  CameraExtrinsics extrinsics;
+  extrinsics.camera_frame = "realsense_front_camera_color_optical_frame";
+  extrinsics.T_B_C.translation() = Eigen::Vector3d(0.520, 0.032, 0.011);
+  extrinsics.T_B_C.linear() =
+      Eigen::Quaterniond(0.561, -0.431, 0.429, -0.562).normalized().toRotationMatrix();
+  return extrinsics;
+}
 
 std::unique_ptr<DatasetReader> open_torwic(const DatasetOptions& options) {
   return std::make_unique<TorwicReader>(options);

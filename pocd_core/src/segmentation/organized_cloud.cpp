@@ -1,5 +1,7 @@
 #include "pocd/segmentation/organized_cloud.hpp"
 
+#include <algorithm>
+
 namespace pocd {
 namespace {
 
@@ -36,6 +38,23 @@ Source first_return(const cv::Mat& depth, int col, int row, int stride) {
 }
 
 }  // namespace
+
+ClassTable::ClassTable(const ClassMap& map) {
+  int highest = map.default_class;
+  for (const ClassInfo& info : map.list) highest = std::max(highest, info.id);
+  for (int id = 0; id <= highest; ++id) {
+    const auto info = std::find_if(map.list.begin(), map.list.end(),
+                                   [&](const ClassInfo& c) { return c.id == id; });
+    int first = id;
+    if (info != map.list.end() && !info->name.empty()) {
+      first = std::find_if(map.list.begin(), map.list.end(), [&](const ClassInfo& c) {
+                return c.name == info->name;
+              })->id;
+    }
+    canonical_.push_back(static_cast<ClassId>(first));
+    role_.push_back(map.role(static_cast<ClassId>(id)));
+  }
+}
 
 void organize(const Frame& frame, int stride, double max_depth_m, const ClassMap& classes,
               const ClassTable& table, ThreadPool& pool, OrganizedCloud& cloud) {

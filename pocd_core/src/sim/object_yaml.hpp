@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pocd/sim/scene.hpp"
-#include "yaml_fields.hpp"
+#include "../config/yaml_fields.hpp"
 
 namespace pocd {
 

@@ -7,7 +7,7 @@
 #include "object_yaml.hpp"
 #include "pocd/common/check.hpp"
 #include "sensor_yaml.hpp"
-#include "yaml_fields.hpp"
+#include "../config/yaml_fields.hpp"
 
 namespace pocd {
 namespace {

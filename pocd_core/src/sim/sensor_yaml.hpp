@@ -2,7 +2,7 @@
 #pragma once
 
 #include "pocd/sim/scenario_yaml.hpp"
-#include "yaml_fields.hpp"
+#include "../config/yaml_fields.hpp"
 
 namespace pocd {
 

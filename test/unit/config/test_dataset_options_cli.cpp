@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/datasets/dataset_options_cli.hpp"
 
 namespace pocd {
 namespace {

@@ -11,13 +11,13 @@ TEST(OpenDataset, UnknownFormatListsTheKnownOnes) {
   options.format = "rosbag";
   options.inputs = {"somewhere"};
   const std::string error = open_error(options);
-  for (const char* word : {"rosbag", "torwic", "rgbd", "pcd", "sim"}) {
+  for (const char* word : {"rosbag", "torwic", "rgbd", "pcd", "mcap"}) {
     EXPECT_NE(error.find(word), std::string::npos) << error;
   }
 }
 
 TEST(OpenDataset, MissingFolderIsNamed) {
-  for (const char* format : {"torwic", "rgbd", "pcd", "sim"}) {
+  for (const char* format : {"torwic", "rgbd", "pcd"}) {
     DatasetOptions options;
     options.format = format;
     options.inputs = {"/nowhere/at_all.yaml"};
@@ -41,23 +41,6 @@ TEST(OpenDataset, EmptyFolderIsNamed) {
     options.T_W_C = Pose::Identity();
     EXPECT_NE(open_error(options).find(folder.path().string()), std::string::npos) << format;
   }
-}
-
-TEST(OpenDataset, SimulatorTakesScenariosInOrder) {
-  const std::filesystem::path scenarios =
-      std::filesystem::path(POCD_SOURCE_DIR) / "config/sim/torwic";
-  DatasetOptions options;
-  options.format = "sim";
-  options.inputs = {scenarios / "0.yaml"};
-  const std::size_t one = open_dataset(options)->size();
-  options.inputs.push_back(scenarios / "2-1.yaml");
-  options.sensor = "perfect";
-  const auto both = open_dataset(options);
-  EXPECT_EQ(both->size(), 2 * one);
-  EXPECT_EQ(both->extrinsics().camera_frame, "realsense_front_camera_color_optical_frame");
-  ASSERT_TRUE(both->next().has_value());
-  options.sensor = "lidar";
-  EXPECT_NE(open_error(options).find("lidar"), std::string::npos);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "pocd/output/change_report.hpp"
+#include "pocd/eval/change_report.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 
 namespace pocd {

@@ -1,5 +1,5 @@
-// Frames from files, in order. Implementations: torwic, toycar, rgbd, pcd, recordings; and the
-// simulator.
+// Frames from files, in order. Implementations: torwic, toycar, rgbd, pcd, recordings; and, in
+// pocd::sim, the simulator.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 #include "pocd/datasets/recording_options.hpp"
 #include "pocd/input/frame.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
 
 namespace pocd {
 
@@ -77,8 +77,7 @@ struct DatasetOptions {
 };
 
 /// Throws InputError: unknown format (listing the known ones), missing or empty folder, unreadable
-/// intrinsics; the text names the path. Part of the configuration library (pocd::config), since the
-/// simulator's scenarios and a PCD sequence's camera are YAML.
+/// intrinsics; the text names the path. open_source (pocd/sim/open_source.hpp) knows "sim", too.
 std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options);
 
 }  // namespace pocd

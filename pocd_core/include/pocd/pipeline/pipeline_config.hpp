@@ -12,7 +12,7 @@
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd/pipeline/pose_gate.hpp"
 #include "pocd/pipeline/pose_refinement.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd/segmentation/segmentation_config.hpp"
 #include "pocd/state/state_config.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "pocd/common/thread_pool.hpp"
 #include "pocd/input/frame.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
 
 namespace pocd {
 

@@ -1,9 +1,8 @@
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "birdseye_canvas.hpp"
@@ -217,18 +216,6 @@ cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objec
   canvas.decorate(options.title,
                   std::to_string(objects.size()) + (objects.size() == 1 ? " object" : " objects"));
   return canvas.image();
-}
-
-void write_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
-                    const std::filesystem::path& file, const BirdseyeOptions& options) {
-  const cv::Mat picture = draw_birdseye(mesh, objects, options);
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), picture);
-  } catch (const cv::Exception&) {
-    written = false;  // an unknown extension; reported like every other failure
-  }
-  if (!written) throw InputError(file.string() + ": picture cannot be written");
 }
 
 }  // namespace pocd

@@ -1,4 +1,4 @@
-#include "pocd/output/change_report.hpp"
+#include "pocd/eval/change_report.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-#include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/datasets/dataset_options_cli.hpp"
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 
-#include "parameter_text.hpp"
+#include "../config/parameter_text.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {

@@ -1,9 +1,7 @@
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
 
 #include <algorithm>
 #include <charconv>
-
-#include "pocd/segmentation/organized_cloud.hpp"
 
 namespace pocd {
 namespace {
@@ -81,22 +79,6 @@ int ClassMap::stationarity_class(ClassId id) const {
 std::string ClassMap::name(ClassId id) const {
   const ClassInfo* info = find(list, id);
   return info && !info->name.empty() ? info->name : "class_" + std::to_string(id);
-}
-
-ClassTable::ClassTable(const ClassMap& map) {
-  int highest = map.default_class;
-  for (const ClassInfo& info : map.list) highest = std::max(highest, info.id);
-  for (int id = 0; id <= highest; ++id) {
-    const ClassInfo* info = find(map.list, static_cast<ClassId>(id));
-    int first = id;
-    if (info && !info->name.empty()) {
-      first = std::find_if(map.list.begin(), map.list.end(), [&](const ClassInfo& c) {
-                return c.name == info->name;
-              })->id;
-    }
-    canonical_.push_back(static_cast<ClassId>(first));
-    role_.push_back(map.role(static_cast<ClassId>(id)));
-  }
 }
 
 }  // namespace pocd

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "birdseye_canvas.hpp"
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
 
 namespace pocd {
 

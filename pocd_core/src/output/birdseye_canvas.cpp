@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
-#include "pocd/map/birdseye.hpp"
+#include "pocd/output/birdseye.hpp"
 
 namespace pocd {
 namespace {

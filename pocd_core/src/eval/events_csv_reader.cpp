@@ -3,7 +3,7 @@
 #include <fstream>
 
 #include "pocd/common/check.hpp"
-#include "pocd/output/change_report.hpp"
+#include "pocd/eval/change_report.hpp"
 
 namespace pocd {
 namespace {
