@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "peer_log.hpp"
+#include "pocd/sim/open_source.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "udp_profiles.hpp"
 #include "whole_run.hpp"
