@@ -14,6 +14,7 @@
 #include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
+#include "pocd_dds/node/node_memory.hpp"
 #include "pocd_dds/node/object_publication.hpp"
 #include "pocd_dds/node/rival_watch.hpp"
 #include "pocd_dds/node/ros_outputs.hpp"
@@ -40,6 +41,7 @@ struct Node::Impl {
       : config(options.config),
         participant(std::make_shared<Participant>(watched(options.bus, watch))),
         pipeline(config.pipeline),
+        keeper(config),
         latency(options.latency_file),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
@@ -47,9 +49,10 @@ struct Node::Impl {
         rivals(participant, {static_cast<std::uint32_t>(config.node.map_id), options.epoch},
                wakeup),
         frames(participant, options.epoch),
-        objects(participant, config, options.epoch),
-        map(participant, config, options.epoch, wakeup),
+        objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
+        map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
+        restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
         intake(participant, config.node, config.pipeline.classes, watch, queue, latency),
         worker([this] { guard([this] { work(); }); }),
         drawer([this] { guard([this] { draw(); }); }) {}
@@ -78,6 +81,7 @@ struct Node::Impl {
   BusWatch watch;  // outlives the participant
   const std::shared_ptr<Participant> participant;
   PocdPipeline pipeline;  // worker only
+  NodeMemory keeper;      // worker only, but for its status
   LatencyLog latency;
   FrameQueue queue;
   Wakeup wakeup;
@@ -106,6 +110,7 @@ struct Node::Impl {
   std::uint64_t busy_frames = 0;
   std::exception_ptr failure;
   std::atomic<bool> failed{false}, worked{false};
+  const bool restored;  // before frames come
 
   Intake intake;
   std::thread worker, drawer;
@@ -131,6 +136,7 @@ void Node::Impl::work() {
     publish(false);
   }
   publish(true);
+  keeper.finish(pipeline, map.publisher(), counts.stamp_ns);
   worked = true;
   wakeup.wake();
 }
@@ -173,6 +179,7 @@ void Node::Impl::process(const Frame& frame) {
   frames.processed(frame);
   for (const DroppedFrame& dropped : queue.take_dropped()) frames.dropped(dropped);
   objects.add(result, frame.stamp_ns);
+  keeper.add(result);
   counts.memory = pipeline.map().memory_status();
 }
 
@@ -183,16 +190,19 @@ void Node::Impl::publish(bool now) {
     objects.send_due(now);
   }
   // Compressed while the others go on; only this thread changes what it reads.
-  const bool step = map.begin_step(now);
+  const bool step = map.begin_step(now || keeper.overdue());
   std::optional<MapDelta> delta;
   if (step) delta = map.make_step(pipeline.map());
-  const std::lock_guard<std::mutex> lock(mutex);
+  std::unique_lock<std::mutex> lock(mutex);
   if (step) {
     map.send_step(std::move(delta), counts.stamp_ns);
     latency.in_step();
   }
   if (map.deltas_written()) latency.written();
   counts.publishing_cpu_ms += thread_cpu_ms() - cpu_ms;
+  const StampNs stamp_ns = counts.stamp_ns;
+  lock.unlock();
+  if (step) keeper.step(pipeline, map.publisher(), stamp_ns);
 }
 
 void Node::Impl::add_problems(IntakeStatus& input) {
@@ -213,6 +223,7 @@ void Node::Impl::add_problems(IntakeStatus& input) {
   rivals.count_problems(problems);
   map.count_problems(problems);
   clock.count_problems(problems);
+  keeper.count_problems(problems);
   const auto more = problems.entries();
   input.problems.insert(input.problems.end(), more.begin(), more.end());
 }
@@ -232,7 +243,9 @@ void Node::Impl::send_status(const std::string& state) {
       objects.failures() + map.failures() + frames.failures() + outputs.failures();
   counts.map = map.traffic();
   counts.objects = objects.objects().size();
-  map.send_manifest(counts.objects, state == "stopped" && map.waiting() == 0);
+  map.send_manifest(counts.objects, state == "stopped" && map.waiting() == 0,
+                    keeper.status());
+  counts.kept = keeper.on() ? std::make_optional(keeper.status()) : std::nullopt;
   status.send(input, counts, queue.size(), queue.dropped(), state, clock.now_ns());
 }
 

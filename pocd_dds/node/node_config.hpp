@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pocd/config/describe.hpp"
+#include "pocd/memory/memory_config.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd_dds/entities/topic_table.hpp"
 
@@ -143,6 +144,7 @@ struct NodeConfig {
   double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
   bool use_clock = false;
   RosOutputConfig outputs;
+  MemoryConfig memory;
   double shutdown_wait_s = 10.0;
 
   template <class Visitor>
@@ -185,6 +187,7 @@ struct NodeConfig {
           "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
           "use_sim_time).");
     visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
+    visit.group("memory", memory, "What is kept on disk from run to run.");
     visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
           "How long to wait at the end for subscribers to acknowledge [s].");
   }

@@ -3,10 +3,11 @@
 namespace pocd::dds {
 
 ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& participant,
-                                     const NodeFile& config, std::uint64_t epoch)
+                                     const NodeFile& config, std::uint64_t epoch,
+                                     std::uint64_t lineage)
     : node_(config.node),
       classes_(config.pipeline.classes),
-      run_{static_cast<std::uint32_t>(config.node.map_id), epoch},
+      run_{static_cast<std::uint32_t>(config.node.map_id), epoch, lineage},
       states_(participant, topics::kObjects),
       events_(participant, topics::kObjectEvents) {}
 
@@ -30,10 +31,16 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
   dispose_gone();
 }
 
+void ObjectPublication::restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns) {
+  FrameResult known;
+  known.changed_objects = objects;
+  add(known, stamp_ns);
+}
+
 void ObjectPublication::dispose_gone() {
   for (auto id = gone_.begin(); id != gone_.end();) {
     pocd_msgs::msg::ObjectState state;
-    state.uuid(object_uuid(run_.epoch, *id));
+    state.uuid(object_uuid(run_.names(), *id));
     id = states_.dispose(state) ? gone_.erase(id) : std::next(id);
   }
 }

@@ -17,10 +17,12 @@ namespace pocd::dds {
 class ObjectPublication {
  public:
   ObjectPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
-                    std::uint64_t epoch);
+                    std::uint64_t epoch, std::uint64_t lineage = 0);
 
   /// Events leave at once; an object's state at most once per period.
   void add(const FrameResult& result, StampNs stamp_ns);
+  /// Objects that are known from before; once, before all others.
+  void restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns);
   /// Sends states that are due, or all that are left with `now`.
   void send_due(bool now);
   bool wait_acknowledged(std::chrono::steady_clock::time_point end);

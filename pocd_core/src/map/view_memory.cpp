@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace pocd {
 namespace {
@@ -30,7 +31,8 @@ int octant_of(const Pose& T_W_C) {
 
 void ViewMemory::add(const OrganizedCloud& cloud, StampNs stamp_ns) {
   const Eigen::Vector3d eye_W = cloud.T_W_C.translation();
-  auto& kept = views_[key_of(cell(eye_W.x()), cell(eye_W.y()), octant_of(cloud.T_W_C))];
+  const std::uint64_t key = key_of(cell(eye_W.x()), cell(eye_W.y()), octant_of(cloud.T_W_C));
+  auto& kept = views_[key];
   if (!kept.empty() && stamp_ns - kept.back().stamp_ns < kRenew_ns) return;
   if (kept.size() == 2) kept.erase(kept.begin());
   View view;
@@ -49,6 +51,7 @@ void ViewMemory::add(const OrganizedCloud& cloud, StampNs stamp_ns) {
     }
   }
   kept.push_back(std::move(view));
+  if (notes_changes_) changed_.insert(key);
 }
 
 double ViewMemory::seen_empty_share(const Points& points_W, StampNs before_ns, double max_depth_m,
@@ -98,7 +101,17 @@ double ViewMemory::seen_empty_share(const Points& points_W, StampNs before_ns, d
 void ViewMemory::set_clock_back(StampNs latest_ns) {
   for (auto& [key, kept] : views_) {
     for (View& view : kept) view.stamp_ns = std::min(view.stamp_ns, latest_ns);
+    if (notes_changes_) changed_.insert(key);
   }
+}
+
+std::set<std::uint64_t> ViewMemory::take_changed() {
+  std::set<std::uint64_t> keys = std::move(changed_);
+  changed_.clear();
+  if (!std::exchange(notes_changes_, true)) {
+    for (const auto& entry : views_) keys.insert(entry.first);
+  }
+  return keys;
 }
 
 std::size_t ViewMemory::size() const {

@@ -32,6 +32,7 @@ class FrameClock {
   StampNs newest_ns() const { return newest_ns_.value_or(0); }
 
  private:
+  friend struct ArchiveAccess;
   std::optional<StampNs> newest_ns_;
   int behind_ = 0;
 };

@@ -69,6 +69,7 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     if (object->added_ns) bound(*object->added_ns);
     object->moment = {};
   }
+  library_.touch_all();
   relocations_.set_clock_back(before_ns);
   views_.set_clock_back(before_ns);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <unordered_map>
 #include <vector>
 
@@ -28,7 +29,12 @@ class ViewMemory {
 
   std::size_t size() const;
 
+  /// Keys of the places whose views have changed since the last call, for who writes them down;
+  /// noted from the first call on.
+  std::set<std::uint64_t> take_changed();
+
  private:
+  friend struct ArchiveAccess;
   struct View {
     StampNs stamp_ns = 0;
     Pose T_C_W = Pose::Identity();
@@ -40,6 +46,8 @@ class ViewMemory {
   /// Views by place of the camera (cells of half a metre) and heading (octants): the latest, and
   /// one at least kRenew_ns older.
   std::unordered_map<std::uint64_t, std::vector<View>> views_;  ///< looked up, never iterated
+  bool notes_changes_ = false;
+  std::set<std::uint64_t> changed_;
 };
 
 }  // namespace pocd

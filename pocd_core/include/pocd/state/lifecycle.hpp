@@ -81,6 +81,7 @@ class RelocationMemory {
   void set_clock_back(StampNs latest_ns);
 
  private:
+  friend struct ArchiveAccess;
   std::deque<Removed> removed_;
 };
 
