@@ -89,6 +89,13 @@ struct MapMirror::Impl {
   void take_deltas();
   void take_replies();
   void forget_objects_of(std::uint64_t epoch);
+  /// Objects of the run before, of the same lineage, stay until the present one has told all it
+  /// knows.
+  void settle_objects();
+  bool is_ours(const msg::ObjectState& object) const {
+    return !manifest || object.epoch() == manifest->epoch() ||
+           object.lineage() == manifest->lineage();
+  }
   void take_tiles();
   void catch_up();
   void count_damaged();
@@ -123,7 +130,7 @@ struct MapMirror::Impl {
   dds::PartAssembler<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>, msg::MapSnapshotReply>
       reply_parts;
   std::pair<std::uint64_t, std::uint64_t> last_at{0, 0};
-  std::uint64_t asked = 0, damaged = 0;
+  std::uint64_t asked = 0, damaged = 0, reused_told = 0;
   dds::ProblemCounter problems;
 
   std::atomic<bool> stopping{false};
@@ -164,6 +171,18 @@ void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
   }
 }
 
+void MapMirror::Impl::settle_objects() {
+  if (!manifest) return;
+  std::size_t told = 0;
+  for (const auto& entry : objects) told += entry.second.epoch() == manifest->epoch();
+  if (told == objects.size() || told < manifest->object_count()) return;
+  for (auto object = objects.begin(); object != objects.end();) {
+    const bool before = object->second.lineage() == manifest->lineage() &&
+                        object->second.epoch() != manifest->epoch();
+    object = before ? objects.erase(object) : std::next(object);
+  }
+}
+
 void MapMirror::Impl::take_events() {
   events.take_some(kMost, [&](const msg::ObjectEvent& message, const dds::SampleMeta& meta) {
     if (meta.valid && options.on_event && message.map_id() == options.map_id) {
@@ -179,14 +198,21 @@ void MapMirror::Impl::take_manifests() {
       return;
     }
     if (manifest && manifest->epoch() != message.epoch()) {
-      forget_objects_of(manifest->epoch());
+      if (manifest->lineage() != message.lineage()) forget_objects_of(manifest->epoch());
       const auto of_this_run = [&](const auto& key) { return std::get<0>(key) == message.epoch(); };
       delta_parts.keep(of_this_run);
       reply_parts.keep(of_this_run);
     }
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
+    const std::uint64_t reused = follower.replica().reused();
+    if (reused > reused_told) {
+      problems.count(manifests.topic(), "epoch_reused", follower.stale_because(),
+                     reused - reused_told);
+      reused_told = reused;
+    }
   });
+  settle_objects();
   publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },
                          Clock::now());
 }
@@ -317,7 +343,7 @@ MirrorStatus MapMirror::Impl::status_now() const {
   status.digest = replica.digest();
   status.tiles = replica.tiles().size();
   for (const auto& [key, object] : objects) {
-    status.objects += !manifest || object.epoch() == manifest->epoch();
+    status.objects += is_ours(object);
   }
   status.publisher_present = publishers.present();
   status.publisher_seen = publishers.followed().has_value();
@@ -354,7 +380,7 @@ MirrorContents MapMirror::contents() const {
     contents.frame_id = impl_->manifest->frame_id();
   }
   for (const auto& [key, state] : impl_->objects) {
-    if (impl_->manifest && state.epoch() != impl_->manifest->epoch()) continue;
+    if (!impl_->is_ours(state)) continue;
     contents.objects.push_back(dds::object_from(state));
     contents.class_names[state.class_id()] = state.class_name();
   }

@@ -112,13 +112,13 @@ Loaded load(Database& database, const StoredState& state) {
   return loaded;
 }
 
-StoredVoxels::StoredVoxels(const std::filesystem::path& file)
-    : database_(file, Database::Access::kRead),
+VoxelsOf::VoxelsOf(Database& database)
+    : database_(database),
       rows_(database_,
             "SELECT i.key, i.data, v.sum, v.data FROM voxel_index i LEFT JOIN voxels v "
             "ON v.key = i.key WHERE i.key BETWEEN ?1 AND ?2 ORDER BY i.key") {}
 
-std::vector<VoxelBlock> StoredVoxels::read(const BlockKey& region) const {
+std::vector<VoxelBlock> VoxelsOf::read(const BlockKey& region) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::map<BlockKey, VoxelBlock> blocks;
   const std::int64_t first = first_row_of(region);

@@ -36,17 +36,31 @@ Total read_rows(Database& database, Table table,
 std::pair<std::uint8_t, std::vector<std::uint32_t>> index_row(
     const std::vector<std::uint8_t>& bytes, const std::string& source);
 
-/// Voxels as they were when the file was opened: what was written since is not asked for, since it
-/// has been read before.
-class StoredVoxels : public RegionSource {
+/// Voxels by a connection of others, as that one sees them.
+class VoxelsOf : public RegionSource {
  public:
-  explicit StoredVoxels(const std::filesystem::path& file);
+  explicit VoxelsOf(Database& database);
   std::vector<VoxelBlock> read(const BlockKey& region) const override;
 
  private:
   mutable std::mutex mutex_;
-  mutable Database database_;
+  Database& database_;
   mutable Statement rows_;
+};
+
+/// Voxels by a connection of its own. What is written to the file meanwhile is not asked for: it
+/// has been read before.
+class StoredVoxels : public RegionSource {
+ public:
+  explicit StoredVoxels(const std::filesystem::path& file)
+      : database_(file, Database::Access::kRead), voxels_(database_) {}
+  std::vector<VoxelBlock> read(const BlockKey& region) const override {
+    return voxels_.read(region);
+  }
+
+ private:
+  Database database_;
+  VoxelsOf voxels_;
 };
 
 }  // namespace pocd::memory

@@ -8,6 +8,7 @@
 #include "folder_lock.hpp"
 #include "loader.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/map/map_io.hpp"
 #include "pocd/map/map_replica.hpp"
 #include "schema.hpp"
 #include "voxel_page.hpp"
@@ -184,7 +185,7 @@ std::vector<std::string> MemoryReader::verify() {
         damaged(db.name() + ": tiles have digest " + digest.hex() + ", noted is " +
                 state->digest.hex());
       }
-      const StoredVoxels voxels(impl_->file);
+      const VoxelsOf voxels(db);
       for (const StoredRegion& region : loaded.regions) {
         try {
           if (voxels.read(region.key).size() != region.present.count()) {
@@ -210,6 +211,27 @@ std::vector<std::string> MemoryReader::verify() {
     sqlite3_exec(db.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
   }
   return wrong;
+}
+
+void MemoryReader::export_map(const std::filesystem::path& file) {
+  reading([&] {
+    Database& db = impl_->database;
+    db.execute("BEGIN");
+    try {
+      TsdfConfig config;
+      config.voxel_size_m = impl_->head.voxel_size_m;
+      config.truncation_voxels = impl_->head.truncation_voxels;
+      TsdfMap map(config);
+      if (const auto state = read_state(db)) {
+        map.restore(load(db, *state).regions, std::make_shared<VoxelsOf>(db));
+      }
+      save_map(map, file);
+    } catch (...) {
+      sqlite3_exec(db.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+      throw;
+    }
+    db.execute("COMMIT");
+  });
 }
 
 void MemoryReader::backup(const std::filesystem::path& folder) {

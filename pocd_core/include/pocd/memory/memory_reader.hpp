@@ -64,6 +64,8 @@ class MemoryReader {
 
   /// Reads everything: one line for each thing that is wrong.
   std::vector<std::string> verify();
+  /// Writes the voxels as save_map() does, of the last step. Throws InputError.
+  void export_map(const std::filesystem::path& file);
   /// Writes the last step as a folder of its own, which must not hold a memory. Throws InputError.
   void backup(const std::filesystem::path& folder);
 
