@@ -68,6 +68,7 @@ pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, const M
   message.observations(object.observations);
   message.last_robot(object.last_robot);
   message.seen_by(object.seen_by);
+  message.seen_in_run(object.seen_in_run);
   return message;
 }
 
@@ -83,6 +84,7 @@ ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message) {
   object.observations = message.observations();
   object.last_robot = message.last_robot();
   object.seen_by = message.seen_by();
+  object.seen_in_run = message.seen_in_run();
   return object;
 }
 

@@ -11,6 +11,7 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
+#include "pocd_dds/node/event_feed.hpp"
 #include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
@@ -51,6 +52,7 @@ struct Node::Impl {
         frames(participant, options.epoch),
         objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
         map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
+        feed(keeper.on() ? std::make_unique<EventFeed>(participant, config, wakeup) : nullptr),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
         restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
         intake(participant, config.node, config.pipeline.classes, watch, queue, latency),
@@ -104,6 +106,7 @@ struct Node::Impl {
   FrameLog frames;
   ObjectPublication objects;
   MapPublication map;
+  std::unique_ptr<EventFeed> feed;  // run()'s thread only; null without a memory
   StatusPublication status;
   WorkStatus counts;
   double busy_ms = 0.0;
@@ -224,6 +227,7 @@ void Node::Impl::add_problems(IntakeStatus& input) {
   map.count_problems(problems);
   clock.count_problems(problems);
   keeper.count_problems(problems);
+  if (feed) feed->count_problems(problems);
   const auto more = problems.entries();
   input.problems.insert(input.problems.end(), more.begin(), more.end());
 }
@@ -240,7 +244,8 @@ void Node::Impl::send_status(const std::string& state) {
   counts.take_cpu_ms = input.take_cpu_ms;
   counts.process_cpu_ms = process_cpu_ms();
   counts.write_failures =
-      objects.failures() + map.failures() + frames.failures() + outputs.failures();
+      objects.failures() + map.failures() + frames.failures() + outputs.failures() +
+      (feed ? feed->failures() : 0);
   counts.map = map.traffic();
   counts.objects = objects.objects().size();
   map.send_manifest(counts.objects, state == "stopped" && map.waiting() == 0,
@@ -265,6 +270,7 @@ void Node::Impl::turn() {
   const double cpu_ms = thread_cpu_ms();
   map.answer_requests();
   map.send_waiting();
+  if (feed) feed->answer();
   {
     const std::lock_guard<std::mutex> lock(mutex);
     if (map.deltas_written()) latency.written();

@@ -18,7 +18,8 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
     events_.write(message);
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
-    objects_[object.id] = object;
+    ObjectSnapshot& known = objects_[object.id] = object;
+    known.seen_in_run = !known_until_ns_ || object.last_seen_ns > *known_until_ns_;
     changed_.insert(object.id);
     touched_.insert(object.id);
   }
@@ -32,6 +33,7 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
 }
 
 void ObjectPublication::restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns) {
+  known_until_ns_ = stamp_ns;
   FrameResult known;
   known.changed_objects = objects;
   add(known, stamp_ns);

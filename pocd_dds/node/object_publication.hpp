@@ -4,6 +4,7 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "pocd_dds/bridge/object_messages.hpp"
@@ -43,6 +44,7 @@ class ObjectPublication {
   std::map<ObjectId, ObjectSnapshot> objects_;
   std::set<ObjectId> changed_, published_, gone_, touched_;
   StampNs stamp_ns_ = 0;
+  std::optional<StampNs> known_until_ns_;  // from the memory; later sights are of this run
   std::chrono::steady_clock::time_point last_sent_{};
 };
 

@@ -116,6 +116,34 @@ std::map<ClassId, std::string> MemoryReader::class_names() {
   });
 }
 
+std::vector<LoggedRun> MemoryReader::runs() {
+  return reading([&] {
+    std::vector<LoggedRun> list;
+    Statement rows(impl_->database,
+                   "SELECT run, epoch, program, started_ns, first_event, ended FROM runs "
+                   "ORDER BY run");
+    while (rows.step()) {
+      list.push_back({rows.integer(0), std::strtoull(rows.text(1).c_str(), nullptr, 16),
+                      rows.text(2), rows.integer(3), static_cast<std::uint64_t>(rows.integer(4)),
+                      rows.integer(5) != 0});
+    }
+    return list;
+  });
+}
+
+std::pair<std::uint64_t, std::uint64_t> MemoryReader::range() {
+  return reading([&] {
+    // One aggregate each: SQLite finds either end without reading what is between.
+    const auto end = [&](const char* which) {
+      return static_cast<std::uint64_t>(impl_->database.number(
+          std::string("SELECT ifnull(") + which + "(seq), 0) FROM events"));
+    };
+    return std::pair(end("min"), end("max"));
+  });
+}
+
+std::uint64_t MemoryReader::lineage() const { return impl_->head.lineage; }
+
 MemoryInfo MemoryReader::info() {
   return reading([&] {
     Database& db = impl_->database;
@@ -144,14 +172,7 @@ MemoryInfo MemoryReader::info() {
       info.first_event = static_cast<std::uint64_t>(log.integer(0));
       info.last_event = static_cast<std::uint64_t>(log.integer(1));
       info.events = static_cast<std::uint64_t>(log.integer(2));
-      Statement runs(db,
-                     "SELECT run, epoch, program, started_ns, first_event, ended FROM runs "
-                     "ORDER BY run");
-      while (runs.step()) {
-        info.runs.push_back({runs.integer(0), std::strtoull(runs.text(1).c_str(), nullptr, 16),
-                             runs.text(2), runs.integer(3),
-                             static_cast<std::uint64_t>(runs.integer(4)), runs.integer(5) != 0});
-      }
+      info.runs = runs();
       info.file_bytes = file_bytes(impl_->file);
     } catch (...) {
       db.execute("ROLLBACK");

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pocd/map/map_delta.hpp"
@@ -54,6 +55,10 @@ class MemoryReader {
 
   /// All of these throw InputError when the file cannot be read.
   MemoryInfo info();
+  std::vector<LoggedRun> runs();
+  /// First and last number of the log; 0, 0 for one without events.
+  std::pair<std::uint64_t, std::uint64_t> range();
+  std::uint64_t lineage() const;
   /// At most `most` events with a number above `after`, by number. Damaged ones are left out and
   /// counted.
   std::vector<LoggedEvent> events(std::uint64_t after, std::size_t most);
