@@ -125,12 +125,13 @@ struct MapMirror::Impl {
   MapFollower follower;
   dds::Publishers publishers;
   std::optional<msg::MapManifest> manifest;
+  dds::SampleMeta::Guid manifest_writer{};
   std::map<std::array<std::uint8_t, 16>, msg::ObjectState> objects;
   dds::PartAssembler<std::pair<std::uint64_t, std::uint64_t>, msg::MapDelta> delta_parts;
   dds::PartAssembler<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>, msg::MapSnapshotReply>
       reply_parts;
   std::pair<std::uint64_t, std::uint64_t> last_at{0, 0};
-  std::uint64_t asked = 0, damaged = 0, reused_told = 0;
+  std::uint64_t asked = 0, damaged = 0;
   dds::ProblemCounter problems;
 
   std::atomic<bool> stopping{false};
@@ -197,6 +198,15 @@ void MapMirror::Impl::take_manifests() {
     if (!publishers.heard(meta.writer, message.epoch(), message.final_version(), Clock::now())) {
       return;
     }
+    // A run has one writer as long as it lives.
+    if (manifest && manifest->epoch() == message.epoch() && meta.writer != manifest_writer) {
+      char text[64];
+      std::snprintf(text, sizeof text, "epoch %016llx names two runs",
+                    static_cast<unsigned long long>(message.epoch()));
+      problems.count(manifests.topic(), "epoch_reused", text, 1);
+      follower.forget();
+    }
+    manifest_writer = meta.writer;
     if (manifest && manifest->epoch() != message.epoch()) {
       if (manifest->lineage() != message.lineage()) forget_objects_of(manifest->epoch());
       const auto of_this_run = [&](const auto& key) { return std::get<0>(key) == message.epoch(); };
@@ -205,12 +215,6 @@ void MapMirror::Impl::take_manifests() {
     }
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
-    const std::uint64_t reused = follower.replica().reused();
-    if (reused > reused_told) {
-      problems.count(manifests.topic(), "epoch_reused", follower.stale_because(),
-                     reused - reused_told);
-      reused_told = reused;
-    }
   });
   settle_objects();
   publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },

@@ -51,17 +51,9 @@ void MapReplica::note_published(std::uint64_t epoch, std::uint64_t version,
   if (!epoch_) epoch_ = epoch;
   if (epoch != *epoch_ && !corrupt_ && version > 0 && version == version_ && digest == digest_) {
     epoch_ = epoch;
-    newest_ = published_ = 0;
+    newest_ = other_epoch_ == epoch ? other_newest_ : 0;
   }
-  if (epoch == *epoch_) {
-    other_epoch_.reset();  // the publisher has the last word on its run
-    if (version < published_) {
-      ++reused_;
-      reused_now_ = corrupt_ = true;
-      newest_ = version;
-    }
-    published_ = version;
-  }
+  if (epoch == *epoch_) other_epoch_.reset();  // the publisher has the last word on its run
   hear(epoch, version);
   if (epoch == *epoch_ && version == version_ && digest != digest_) corrupt_ = true;
 }
@@ -79,8 +71,6 @@ bool MapReplica::replace(std::uint64_t epoch, std::uint64_t version, const MapDi
   for (const auto& [key, tile] : by_key) add(sum, tile_digest(key, tile.payload));
   if (sum != digest) return false;
   if (!same_run) newest_ = other_epoch_ == epoch ? other_newest_ : 0;
-  if (!same_run) published_ = 0;
-  reused_now_ = false;
   newest_ = std::max(newest_, version);
   epoch_ = epoch;
   other_epoch_.reset();
@@ -96,10 +86,6 @@ std::string MapReplica::stale_because() const {
   if (other_epoch_) {
     return "the publisher runs in epoch " + std::to_string(*other_epoch_) +
            ", this copy is of epoch " + std::to_string(*epoch_);
-  }
-  if (reused_now_) {
-    return "epoch " + std::to_string(*epoch_) + " is used by another run, at version " +
-           std::to_string(published_) + "; this copy is of the run before";
   }
   if (corrupt_) return "the digest of version " + std::to_string(version_) + " does not fit";
   if (version_ != newest_) {

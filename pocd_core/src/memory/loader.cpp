@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "../map/zstd_codec.hpp"
@@ -27,8 +28,14 @@ Total read_rows(Database& database, Table table,
   const std::string query =
       std::string("SELECT key, sum, data FROM ") + kTableNames[table] + " ORDER BY key";
   Statement rows(database, query.c_str());
+  std::optional<std::int64_t> before;
   while (rows.step()) {
     const std::int64_t key = rows.integer(0);
+    if (before && key <= *before) {
+      damaged(row_name(database, kTableNames[table], key) + " is out of order");
+      break;
+    }
+    before = key;
     const auto sum = static_cast<std::uint64_t>(rows.integer(1));
     std::vector<std::uint8_t> data = rows.blob(2);
     ++total.rows;

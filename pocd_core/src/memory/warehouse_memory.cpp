@@ -33,6 +33,7 @@ double ms_since(Clock::time_point start) {
 std::unique_ptr<Database> open_for_writing(const std::filesystem::path& file) {
   try {
     auto database = std::make_unique<Database>(file, Database::Access::kWrite);
+    read_head(*database);  // before anything of another's file is changed
     // A commit is on the disk when it returns: the writer's thread waits, nobody else.
     database->execute(
         "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"

@@ -21,7 +21,17 @@
 
 namespace pocd::test {
 
-/// Three laps of two robots in the small warehouse, with a small camera at a low rate.
+inline std::vector<Frame> frames_of(const Scenario& scenario) {
+  SimReaderOptions options;
+  options.with_color = false;
+  SimReader reader(scenario, options);
+  std::vector<Frame> list;
+  while (auto frame = reader.next()) list.push_back(std::move(*frame));
+  return list;
+}
+
+/// Three laps of two robots in the small warehouse, with a small camera at a low rate: things are
+/// added, moved and removed.
 inline const std::vector<Frame>& circuit_frames() {
   static const std::vector<Frame> frames = [] {
     Scenario scenario =
@@ -29,13 +39,15 @@ inline const std::vector<Frame>& circuit_frames() {
     CameraModel& c = scenario.camera;
     c = {c.width / 4, c.height / 4, c.fx / 4, c.fy / 4, c.cx / 4, c.cy / 4};
     scenario.frame_rate_hz = 3.0;
-    SimReaderOptions options;
-    options.with_color = false;
-    SimReader reader(scenario, options);
-    std::vector<Frame> list;
-    while (auto frame = reader.next()) list.push_back(std::move(*frame));
-    return list;
+    return frames_of(scenario);
   }();
+  return frames;
+}
+
+/// Two robots, two short laps, a box that goes.
+inline const std::vector<Frame>& small_frames() {
+  static const std::vector<Frame> frames = frames_of(load_scenario(
+      std::filesystem::path(POCD_SOURCE_DIR) / "test/integration/recording/small_run.yaml"));
   return frames;
 }
 

@@ -1,7 +1,9 @@
 // Processes that are killed at any moment, and go on where they were.
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdlib>
 
@@ -17,11 +19,23 @@ int kills_wanted() {
   return text != nullptr ? std::atoi(text) : 200;
 }
 
-/// A step after every frame, so that most kills meet one that is being written.
-int run_to_the_end(const std::filesystem::path& folder) {
+/// A step after every frame, so that most kills meet one that is being written. Counts them.
+int run_to_the_end(const std::filesystem::path& folder, std::atomic<std::uint64_t>& steps) {
   MemoryRunner run(circuit_config(), folder);
-  while (run.process(circuit_frames())) run.step();
+  while (run.process(small_frames())) {
+    run.step();
+    ++steps;
+  }
   return run.finish() ? 0 : 1;
+}
+
+/// Waits until the child has made so many steps, or has ended.
+void wait_for_steps(pid_t child, const std::atomic<std::uint64_t>& steps, std::uint64_t wanted) {
+  siginfo_t info{};
+  while (steps < wanted && ::waitid(P_PID, static_cast<id_t>(child), &info,
+                                    WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0) {
+    ::usleep(200);
+  }
 }
 
 TEST(KilledMemory, HoldsAStateThatWasAndGoesOnToTheSameEnd) {
@@ -31,13 +45,17 @@ TEST(KilledMemory, HoldsAStateThatWasAndGoesOnToTheSameEnd) {
   {
     MemoryRunner whole(circuit_config());
     digest_at[0] = whole.publisher().digest().hex();
-    for (std::size_t i = 0; whole.process(circuit_frames()); ++i) {
+    for (std::size_t i = 0; whole.process(small_frames()); ++i) {
       whole.publish();
-      digest_at[circuit_frames()[i].stamp_ns] = last_digest = whole.publisher().digest().hex();
+      digest_at[small_frames()[i].stamp_ns] = last_digest = whole.publisher().digest().hex();
     }
     for (const ObjectEvent& e : whole.events()) events.push_back(line(e));
   }
   const int wanted = kills_wanted();
+  void* shared = ::mmap(nullptr, sizeof(std::atomic<std::uint64_t>), PROT_READ | PROT_WRITE,
+                        MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(shared, MAP_FAILED);
+  auto& steps = *new (shared) std::atomic<std::uint64_t>(0);
   Random random(1);
   int kills = 0, ends = 0, steps_found = 0;
   while (kills < wanted) {
@@ -45,16 +63,19 @@ TEST(KilledMemory, HoldsAStateThatWasAndGoesOnToTheSameEnd) {
     std::uint64_t lineage = 0;
     StampNs reached_ns = 0;
     for (bool ended = false; !ended && kills < wanted;) {
+      steps = 0;
       const pid_t child = ::fork();
       if (child == 0) {
         int code = 99;
         try {
-          code = run_to_the_end(folder / "memory");
+          code = run_to_the_end(folder / "memory", steps);
         } catch (...) {
         }
         ::_exit(code);
       }
-      ::usleep(static_cast<useconds_t>(random.below(random.below(4) == 0 ? 20'000 : 250'000)));
+      // Sometimes before it has come to anything.
+      if (random.below(8) > 0) wait_for_steps(child, steps, 1 + random.below(12));
+      ::usleep(static_cast<useconds_t>(random.below(4'000)));
       ::kill(child, SIGKILL);
       int status = 0;
       ::waitpid(child, &status, 0);
@@ -93,6 +114,7 @@ TEST(KilledMemory, HoldsAStateThatWasAndGoesOnToTheSameEnd) {
   }
   EXPECT_GT(steps_found, wanted / 4);
   if (wanted >= 100) EXPECT_GT(ends, 0);
+  ::munmap(shared, sizeof(std::atomic<std::uint64_t>));
   RecordProperty("kills", kills);
   RecordProperty("runs_to_the_end", ends);
 }

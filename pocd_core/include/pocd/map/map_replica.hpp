@@ -28,10 +28,8 @@ class MapReplica {
   /// ones come, in order, or a snapshot.
   DeltaOutcome apply(const MapDelta& delta);
 
-  /// What the publisher says it is at (manifest), in the order in which it says it. Makes the copy
-  /// stale when it is not. A new run that goes on with just this map is followed without a
-  /// snapshot. A lower version than before, of the same epoch, is of another run under the same
-  /// name: the copy is of no use then.
+  /// What the publisher says it is at (manifest). Makes the copy stale when it is not. A new run
+  /// that goes on with just this map is followed as it is.
   void note_published(std::uint64_t epoch, std::uint64_t version, const MapDigest& digest);
 
   /// Takes a whole map, for example a snapshot or the transient-local tiles with a manifest.
@@ -46,8 +44,6 @@ class MapReplica {
   bool current() const { return stale_because().empty(); }
 
   std::optional<std::uint64_t> epoch() const { return epoch_; }
-  /// Times that an epoch was found to be used again.
-  std::uint64_t reused() const { return reused_; }
   bool corrupt() const { return corrupt_; }  ///< holds what does not fit its digest
   std::uint64_t version() const { return version_; }
   MapDigest digest() const { return digest_; }
@@ -61,9 +57,6 @@ class MapReplica {
   std::uint64_t other_newest_ = 0;            // version heard of in that one
   std::uint64_t version_ = 0;
   std::uint64_t newest_ = 0;  // version heard of in our epoch
-  std::uint64_t published_ = 0;  // the last that the publisher said of our epoch
-  std::uint64_t reused_ = 0;
-  bool reused_now_ = false;  // what is held is of the other run
   bool corrupt_ = false;
   MapDigest digest_;
   std::map<TileKey, MapTile> tiles_;
