@@ -21,9 +21,9 @@ void show_info(const std::filesystem::path& folder) {
               info.ended_clean ? "true" : "false", info.stamp_ns);
   std::printf("map_version: %" PRIu64 "\nmap_digest: %s\n", info.map_version,
               info.digest.hex().c_str());
-  std::printf("objects: %" PRIu64 "\nviews: %" PRIu64 "\ntiles: %" PRIu64 "\nvoxel_tiles: %" PRIu64
+  std::printf("objects: %" PRIu64 "\nfree_blocks: %" PRIu64 "\ntiles: %" PRIu64 "\nvoxel_tiles: %" PRIu64
               "\n",
-              info.objects, info.views, info.tiles, info.voxel_tiles);
+              info.objects, info.free_blocks, info.tiles, info.voxel_tiles);
   std::printf("events: %" PRIu64 "\nfirst_event: %" PRIu64 "\nlast_event: %" PRIu64
               "\nevent_bytes: %" PRIu64 "\nfile_bytes: %" PRIu64 "\nruns:\n",
               info.events, info.first_event, info.last_event, info.event_bytes, info.file_bytes);

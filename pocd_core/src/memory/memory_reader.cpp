@@ -162,7 +162,7 @@ MemoryInfo MemoryReader::info() {
         info.map_version = state->map_version;
         info.digest = state->digest;
         info.objects = state->totals[kObjects].rows;
-        info.views = state->totals[kViews].rows;
+        info.free_blocks = state->totals[kFreeSpaceTable].rows;
         info.tiles = state->totals[kTiles].rows;
         info.voxel_tiles = state->totals[kVoxels].rows;
         info.event_bytes = state->event_bytes;

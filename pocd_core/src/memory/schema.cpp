@@ -17,7 +17,7 @@ constexpr const char* kTablesSql = R"sql(
   CREATE TABLE state(id INTEGER PRIMARY KEY CHECK(id = 1), sum INTEGER, data BLOB);
   CREATE TABLE parts(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE objects(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
-  CREATE TABLE views(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
+  CREATE TABLE free_space(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE tiles(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE voxel_index(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE voxels(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);

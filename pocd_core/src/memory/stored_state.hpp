@@ -20,12 +20,6 @@ void archive(Archive& a, MapDigest& d) {
 }
 
 template <class Archive>
-void archive(Archive& a, Evidence& e) {
-  a(e.delta_m, e.stationarity_class, e.k, e.c1, e.c2, e.visible_share, e.seen_through_share,
-    e.measurement_sigma_m, e.before, e.after, e.rule);
-}
-
-template <class Archive>
 void archive(Archive& a, ObjectEvent& e) {
   a.version(1);
   a(e.sequence, e.kind, e.object, e.class_id, e.stamp_ns, e.frame_sequence, e.robot, e.box,
@@ -43,8 +37,8 @@ void archive(Archive& a, PocdPipeline::Numbers& n) {
 namespace memory {
 
 /// Tables whose rows have a key, a checksum and bytes.
-enum Table { kParts, kObjects, kViews, kTiles, kVoxelIndex, kVoxels, kTables };
-constexpr std::array<const char*, kTables> kTableNames = {"parts", "objects",     "views",
+enum Table { kParts, kObjects, kFreeSpaceTable, kTiles, kVoxelIndex, kVoxels, kTables };
+constexpr std::array<const char*, kTables> kTableNames = {"parts", "objects",     "free_space",
                                                           "tiles", "voxel_index", "voxels"};
 
 /// Of all rows of a table: a row that is missing or of another time is noticed.

@@ -2,11 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "archive_object.hpp"
+#include "../track/object_tracker.hpp"
 #include "frame_clock.hpp"
-#include "object_tracker.hpp"
 #include "pocd/pipeline/pose_gate.hpp"
 #include "pocd/segmentation/planes.hpp"
 
@@ -45,13 +46,8 @@ struct ArchiveAccess {
     a(g.known_, g.from_class_, g.normal_W_, g.offset_m_, g.level_m_, g.is_strip_);
   }
   template <class Archive>
-  static void describe(Archive& a, RelocationMemory& m) {
-    a(m.removed_);
-  }
-  template <class Archive>
-  static void describe(Archive& a, RelocationMemory::Removed& r) {
-    a(r.id, r.class_id, r.box, r.first_seen_ns, r.verified_ns, r.contested_since_ns, r.removed_ns,
-      r.seen_by);
+  static void describe(Archive& a, Departures& d) {
+    a(d.list_);
   }
 
   /// The index lists each surfel in its own cell, or in one that it crept out of.
@@ -92,32 +88,25 @@ struct ArchiveAccess {
     return at != m.index_.end() && at->second == static_cast<std::int32_t>(i);
   }
 
-  using View = ViewMemory::View;
-  template <class Archive>
-  static void describe(Archive& a, View& v) {
-    a(v.stamp_ns, v.T_C_W, v.camera, v.nearest_m);
-    if constexpr (Archive::kLoads) {
-      const auto pixels = static_cast<std::int64_t>(v.camera.width) * v.camera.height;
-      if (v.camera.width < 0 || pixels != static_cast<std::int64_t>(v.nearest_m.size())) {
-        a.fail("a view has another size than its camera");
-      }
-    }
+  using FreeBlock = FreeSpace::Block;
+  /// Null where nothing was seen.
+  static const FreeBlock* free_block(const FreeSpace& space, const BlockKey& key) {
+    const auto at = space.blocks_.find(key);
+    return at == space.blocks_.end() ? nullptr : at->second.get();
   }
-  static std::vector<View>* views(ViewMemory& memory, std::uint64_t key) {
-    const auto at = memory.views_.find(key);
-    return at == memory.views_.end() ? nullptr : &at->second;
-  }
-  static std::vector<View>& make_views(ViewMemory& memory, std::uint64_t key) {
-    return memory.views_[key];
+  static FreeBlock& make_free_block(FreeSpace& space, const BlockKey& key) {
+    std::unique_ptr<FreeBlock>& block = space.blocks_[key];
+    block = std::make_unique<FreeBlock>();
+    return *block;
   }
 
-  /// But for objects and views, which are pieces of their own.
+  /// But for objects and free space, which are pieces of their own.
   template <class Archive>
   static void describe(Archive& a, ObjectTracker& t) {
-    a(t.library_.next_id_, t.next_event_, t.relocations_);
+    a(t.library_.next_id_, t.next_event_, t.departures_);
   }
   static ObjectLibrary& library(ObjectTracker& t) { return t.library_; }
-  static ViewMemory& views(ObjectTracker& t) { return t.views_; }
+  static FreeSpace& free_space(ObjectTracker& t) { return t.free_space_; }
   static std::uint32_t& next_id(ObjectTracker& t) { return t.library_.next_id_; }
   static std::uint64_t& next_event(ObjectTracker& t) { return t.next_event_; }
 

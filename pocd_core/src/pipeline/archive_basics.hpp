@@ -3,7 +3,7 @@
 
 #include "pocd/common/archive.hpp"
 #include "pocd/common/types.hpp"
-#include "pocd/input/camera_model.hpp"
+#include "pocd/pipeline/frame_result.hpp"
 #include "pocd/state/object_state.hpp"
 
 namespace pocd {
@@ -24,8 +24,9 @@ void archive(Archive& a, Belief& b) {
 }
 
 template <class Archive>
-void archive(Archive& a, CameraModel& c) {
-  a(c.width, c.height, c.fx, c.fy, c.cx, c.cy);
+void archive(Archive& a, Evidence& e) {
+  a(e.delta_m, e.stationarity_class, e.k, e.c1, e.c2, e.visible_share, e.seen_through_share,
+    e.measurement_sigma_m, e.before, e.after, e.rule);
 }
 
 }  // namespace pocd

@@ -3,12 +3,13 @@
 
 #include "archive_basics.hpp"
 #include "pocd/map/object_library.hpp"
+#include "pocd/track/departures.hpp"
 
 namespace pocd {
 
 template <class Archive>
 void archive(Archive& a, Surfel& s) {
-  a(s.point_W, s.normal_W, s.weight, s.hits, s.seen_through);
+  a(s.point_W, s.normal_W, s.weight, s.hits, s.seen_through, s.arrived, s.last_hit_ns);
 }
 
 template <class Archive>
@@ -20,17 +21,22 @@ void archive(Archive& a, Moment& m) {
 template <class Archive>
 void archive(Archive& a, LibraryObject& o) {
   a.version(1);
-  a(o.class_id, o.stationarity_class, o.confirmed, o.model, o.box, o.centroid_W, o.belief);
-  a(o.first_seen_ns, o.last_seen_ns, o.verified_ns, o.contested_ns, o.contested_since_ns);
-  a(o.arrived, o.last_robot, o.seen_by, o.moment, o.observations);
-  a(o.frames_in_view, o.frames_seen_through, o.frames_displaced, o.frames_odd);
-  a(o.reported_box, o.expected_box, o.grew_ns, o.box_before_growth, o.growing, o.cut, o.cut_above);
-  a(o.gained, o.eroded, o.returned, o.added_ns, o.moved_from, o.changed);
-  a(o.box_surfels, o.most_surfels, o.companions);
+  a(o.class_id, o.stationarity_class, o.model, o.box, o.centroid_W, o.belief, o.arrival);
+  a(o.first_seen_ns, o.last_seen_ns, o.in_place_ns, o.last_robot, o.seen_by, o.moment);
+  a(o.observations, o.confirmed, o.added_ns, o.reported_box, o.changed);
+  a(o.looks_missed, o.looks_unobserved, o.unobserved_since_ns, o.looks_displaced, o.looks_losing);
+  a(o.lost, o.companions, o.box_surfels, o.most_surfels);
+}
+
+template <class Archive>
+void archive(Archive& a, Departure& d) {
+  a(d.id, d.part_of, d.class_id, d.box, d.surfels, d.first_seen_ns, d.in_place_ns, d.departed_ns,
+    d.seen_by, d.evidence);
 }
 
 #if defined(__x86_64__) && defined(__GLIBCXX__)
-static_assert(sizeof(LibraryObject) == 776 && sizeof(Moment) == 80 && sizeof(Surfel) == 32,
+static_assert(sizeof(LibraryObject) == 616 && sizeof(Moment) == 80 && sizeof(Surfel) == 40 &&
+                  sizeof(Departure) == 328,
               "a field came or went: describe it above, and change kPiecesVersion");
 #endif
 

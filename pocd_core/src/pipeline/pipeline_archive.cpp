@@ -11,8 +11,26 @@ namespace {
 enum Part : std::uint64_t { kGates = 1, kGround = 2, kTracker = 3 };
 
 std::string name_of(const Piece& piece) {
-  static const char* const kinds[] = {"part", "object", "view"};
+  static const char* const kinds[] = {"part", "object", "block of free space"};
   return std::string(kinds[static_cast<int>(piece.kind)]) + " " + std::to_string(piece.key);
+}
+
+// 21 bits per axis.
+constexpr std::int64_t kHalf = std::int64_t{1} << 20;
+
+std::uint64_t packed(const BlockKey& key) {
+  const auto axis = [](std::int32_t v) {
+    POCD_CHECK(v >= -kHalf && v < kHalf);
+    return static_cast<std::uint64_t>(v + kHalf);
+  };
+  return axis(key.z) << 42 | axis(key.y) << 21 | axis(key.x);
+}
+
+BlockKey unpacked(std::uint64_t key) {
+  const auto axis = [](std::uint64_t bits) {
+    return static_cast<std::int32_t>(static_cast<std::int64_t>(bits & (2 * kHalf - 1)) - kHalf);
+  };
+  return {axis(key), axis(key >> 21), axis(key >> 42)};
 }
 
 }  // namespace
@@ -43,10 +61,11 @@ std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
     add(PieceKind::kObject, to_index(id),
         object ? archived(*object) : std::vector<std::uint8_t>{}, out);
   }
-  ViewMemory& views = ArchiveAccess::views(parts.tracker);
-  for (const std::uint64_t key : views.take_changed()) {
-    const auto* kept = ArchiveAccess::views(views, key);
-    add(PieceKind::kView, key, kept ? archived(*kept) : std::vector<std::uint8_t>{}, out);
+  FreeSpace& space = ArchiveAccess::free_space(parts.tracker);
+  for (const BlockKey& key : space.take_changed()) {
+    const auto* block = ArchiveAccess::free_block(space, key);
+    add(PieceKind::kFreeSpace, packed(key), block ? archived(*block) : std::vector<std::uint8_t>{},
+        out);
   }
   return out;
 }
@@ -78,8 +97,9 @@ void PipelineArchive::restore(const PipelineParts& parts, const std::vector<Piec
         ArchiveAccess::insert(library, std::move(object));
         break;
       }
-      case PieceKind::kView:
-        a(ArchiveAccess::make_views(ArchiveAccess::views(parts.tracker), piece.key));
+      case PieceKind::kFreeSpace:
+        a(ArchiveAccess::make_free_block(ArchiveAccess::free_space(parts.tracker),
+                                         unpacked(piece.key)));
         break;
     }
     a.finish();
@@ -93,7 +113,7 @@ void PipelineArchive::restore(const PipelineParts& parts, const std::vector<Piec
   }
   // What was just put there is as it was given.
   library.take_touched();
-  ArchiveAccess::views(parts.tracker).take_changed();
+  ArchiveAccess::free_space(parts.tracker).take_changed();
 }
 
 }  // namespace pocd

@@ -77,9 +77,9 @@ INSTANTIATE_TEST_SUITE_P(
                "(SELECT sum FROM objects ORDER BY key DESC LIMIT 1) WHERE key = (SELECT min(key) FROM "
                "objects)",
                "of objects is damaged"},
-        Defect{"View", "UPDATE views SET data = substr(data, 2) WHERE key = (SELECT min(key) FROM views)",
-               "of views is damaged"},
-        Defect{"ViewMissing", "DELETE FROM views WHERE key = (SELECT min(key) FROM views)", "views has"},
+        Defect{"FreeSpace", "UPDATE free_space SET data = substr(data, 2) WHERE key = (SELECT min(key) FROM free_space)",
+               "of free_space is damaged"},
+        Defect{"FreeSpaceMissing", "DELETE FROM free_space WHERE key = (SELECT min(key) FROM free_space)", "free_space has"},
         Defect{"Tile", "UPDATE tiles SET data = zeroblob(99) WHERE key = (SELECT min(key) FROM tiles)",
                "of tiles is damaged"},
         Defect{"TileMissing", "DELETE FROM tiles WHERE key = (SELECT min(key) FROM tiles)", "tiles has"},

@@ -40,7 +40,7 @@ struct MemoryInfo {
   std::uint64_t map_version = 0;
   MapDigest digest;
   std::uint64_t objects = 0;  ///< tentative ones too
-  std::uint64_t views = 0, tiles = 0, voxel_tiles = 0;
+  std::uint64_t free_blocks = 0, tiles = 0, voxel_tiles = 0;
   std::uint64_t first_event = 0, last_event = 0, events = 0;  ///< of the log; 0: none
   std::uint64_t event_bytes = 0, file_bytes = 0;
   std::vector<LoggedRun> runs;

@@ -9,7 +9,7 @@ namespace pocd {
 enum class PieceKind : std::uint8_t {
   kPart = 0,    ///< clocks, gates, ground, counters; the key says which
   kObject = 1,  ///< one object, tentative ones too; the key is its id
-  kView = 2     ///< views from one place; the key is the place's
+  kFreeSpace = 2  ///< a block of cells that were seen empty; the key is the block's
 };
 constexpr int kPieceKinds = 3;
 
@@ -21,6 +21,6 @@ struct Piece {
 };
 
 /// Number of the layout of all pieces: another one is another layout.
-constexpr int kPiecesVersion = 1;
+constexpr int kPiecesVersion = 2;
 
 }  // namespace pocd

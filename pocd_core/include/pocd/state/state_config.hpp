@@ -21,7 +21,7 @@ struct StateConfig {
   int merge_frames = 10;
   double moment_s = 0.1;
   double relocation_window_s = 60.0;
-  double relocation_reach_m = 2.5;
+  double relocation_reach_m = 1.5;
   double least_depth_m = 0.4;
   bool explain_new = true;
 

@@ -1,0 +1,197 @@
+// ObjectTracker: what departed and what arrived, and whether they are one thing.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pocd/association/point_to_plane_icp.hpp"
+#include "tracker_step.hpp"
+
+namespace pocd {
+namespace {
+
+/// The new surface lies on the old one, moved, with at most this share beside it.
+constexpr double kOutlierShare = 0.2;
+/// At most this share of the old surface, moved, lies where nothing is.
+constexpr double kEmptyShare = 0.15;
+/// At least this share of the old surface, moved, is seen at the new place.
+constexpr double kSeenShare = 0.25;
+/// A thing in a place that was never seen empty is the departed one only when it is nearer than
+/// this share of its length.
+constexpr double kNearShare = 0.5;
+constexpr std::size_t kAlignPoints = 600;
+
+double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
+
+/// The new one is no larger than the old one, and stands as high.
+bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) {
+  const auto sorted = [](const OrientedBox& box) {
+    const double x = box.size_m.x(), y = box.size_m.y();
+    return Eigen::Vector3d(std::max(x, y), std::min(x, y), box.size_m.z());
+  };
+  const Eigen::Vector3d f = sorted(found), k = sorted(known);
+  const auto room = [&](double x) { return x + std::max(slack_m, 0.25 * x); };
+  return f[0] <= room(k[0]) && f[1] <= room(k[0]) && f[2] <= room(k[2]) && k[2] <= room(f[2]);
+}
+
+}  // namespace
+
+bool ObjectTracker::is_departed(const Departure& departure, const LibraryObject& found) const {
+  if (departure.class_id != found.class_id || departure.id == found.id) return false;
+  // What was seen in its place when the new one was there, too, is another thing.
+  if (departure.in_place_ns > found.first_seen_ns) return false;
+  const double slack_m = 3.0 * config_.map.voxel_size_m;
+  const double distance_m =
+      (departure.box.pose.position_W - found.box.pose.position_W).head<2>().norm();
+  if (distance_m > config_.state.relocation_reach_m) return false;
+  if (distance_m < 0.5 * config_.change.tau_m) return false;
+  if (found.arrival != Arrival::kArrived && distance_m > kNearShare * longest_side(departure.box))
+    return false;
+  if (!may_be(found.box, departure.box, slack_m)) return false;
+
+  Points points, normals, source;
+  for (const Surfel& s : departure.surfels) {
+    points.push_back(s.point_W);
+    normals.push_back(s.normal_W);
+  }
+  const auto& surfels = found.model.surfels();
+  const std::size_t step = std::max<std::size_t>(1, surfels.size() / kAlignPoints);
+  for (std::size_t i = 0; i < surfels.size(); i += step) source.push_back(surfels[i].point_W);
+  const double inlier_m = 1.5 * config_.map.voxel_size_m;
+  const IcpTarget target(points, normals, inlier_m,
+                         std::max(inlier_m, config_.association.icp_max_distance_m));
+  IcpOptions options;
+  options.max_iterations = config_.association.icp_iterations;
+  options.robust_scale_m = config_.map.voxel_size_m;
+  const double turn_rad = departure.box.pose.yaw_rad - found.box.pose.yaw_rad;
+  for (int quarter = -1; quarter < 4; ++quarter) {
+    // First as it stands, then with the boxes' sides along each other.
+    Pose start = Pose::Identity();
+    if (quarter >= 0) {
+      start.linear() = Eigen::AngleAxisd(turn_rad + quarter * M_PI / 2.0, Eigen::Vector3d::UnitZ())
+                           .toRotationMatrix();
+    }
+    start.translation() =
+        departure.box.pose.position_W - start.linear() * found.box.pose.position_W;
+    const IcpResult icp = point_to_plane_icp(target, source, options, start);
+    if (icp.dissimilarity > kOutlierShare) continue;
+    const Eigen::Isometry3f T = icp.T_target_source.inverse().cast<float>();
+    std::size_t empty = 0, seen = 0;
+    for (const Surfel& s : departure.surfels) {
+      const Eigen::Vector3f there = T * s.point_W;
+      if (found.model.nearest(there, static_cast<float>(inlier_m)) != ObjectModel::kNone) {
+        ++seen;
+      } else if (free_space_.seen_empty(there)) {
+        ++empty;
+      }
+    }
+    const auto all = static_cast<double>(departure.surfels.size());
+    if (static_cast<double>(empty) <= kEmptyShare * static_cast<double>(seen + empty) &&
+        static_cast<double>(seen) >= kSeenShare * all) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& object) {
+  for (const ObjectId id :
+       library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
+    const LibraryObject* other = library_.find(id);
+    if (other->confirmed && other->class_id == object.class_id && other->looks_unobserved > 0 &&
+        other->in_place_ns <= object.first_seen_ns) {
+      return true;
+    }
+  }
+  (void)step;
+  return false;
+}
+
+void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
+  departure.evidence.rule = rule;
+  LibraryObject* best = nullptr;
+  double best_m = 0.0;
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  for (const ObjectId id :
+       library_.near(departure.box.pose.position_W, config_.state.relocation_reach_m)) {
+    LibraryObject* other = library_.find(id);
+    const bool open = other->confirmed
+                          ? other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns
+                          : other->observations >= 2;
+    if (!open || other->id == departure.part_of || !is_departed(departure, *other)) continue;
+    const double distance_m =
+        (departure.box.pose.position_W - other->box.pose.position_W).head<2>().norm();
+    if (!best || distance_m < best_m) best = other, best_m = distance_m;
+  }
+  if (best) {
+    report_move(step, *best, departure, rule);
+    return;
+  }
+  ObjectEvent event;
+  event.sequence = next_event_++;
+  event.kind = EventKind::kRemoved;
+  event.object = departure.id;
+  event.class_id = departure.class_id;
+  event.stamp_ns = step.frame.stamp_ns;
+  event.frame_sequence = step.frame.sequence;
+  event.robot = step.frame.robot;
+  event.box = departure.box;
+  event.evidence = departure.evidence;
+  step.result.events.push_back(std::move(event));
+  if (departure.part_of == ObjectId::kNone) step.result.retired.push_back(departure.id);
+  departures_.add(std::move(departure));
+}
+
+bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
+  const Departure* best = nullptr;
+  double best_m = 0.0;
+  for (const Departure& d :
+       departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
+    if (!is_departed(d, object)) continue;
+    const double distance_m =
+        (d.box.pose.position_W - object.box.pose.position_W).head<2>().norm();
+    if (!best || distance_m < best_m) best = &d, best_m = distance_m;
+  }
+  if (!best) return false;
+  const Departure from = *best;
+  report_move(step, object, from, "found_again");
+  return true;
+}
+
+void ObjectTracker::confirm(Step& step, LibraryObject& object) {
+  if (find_origin(step, object)) return;
+  object.confirmed = true;
+  object.reported_box = object.box;
+  object.lost = 0;
+  object.added_ns = step.frame.stamp_ns;
+  mark_changed(object);
+  add_event(step, EventKind::kAdded, object, to_string(object.arrival));
+}
+
+void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departure& from,
+                                const std::string& rule) {
+  const std::optional<ObjectId> absorbed =
+      found.confirmed ? std::make_optional(found.id) : std::nullopt;
+  const ObjectId old = found.id;
+  departures_.forget(from.id);
+  if (absorbed) step.result.retired.push_back(*absorbed);
+  step.map.reassign_object(old, from.id);
+  std::replace(step.owners.begin(), step.owners.end(), old, from.id);
+  library_.rename(old, from.id);
+  auto& retired = step.result.retired;
+  retired.erase(std::remove(retired.begin(), retired.end(), from.id), retired.end());
+  found.first_seen_ns = from.first_seen_ns;
+  found.seen_by.insert(from.seen_by.begin(), from.seen_by.end());
+  found.confirmed = true;
+  found.added_ns.reset();
+  found.reported_box = found.box;
+  found.lost = 0;
+  found.changed = false;  // it was listed under its old id
+  mark_changed(found);
+  ObjectEvent& event = add_event(step, EventKind::kMoved, found, rule);
+  event.previous_box = from.box;
+  event.absorbed = absorbed;
+  event.evidence = from.evidence;
+  event.evidence.rule = rule;
+}
+
+}  // namespace pocd
