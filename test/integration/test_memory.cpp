@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "bus_harness.hpp"
+#include "pocd/common/check.hpp"
 #include "pocd/memory/memory_reader.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
