@@ -10,7 +10,7 @@ class HistoryOfARun : public ::testing::Test {
  protected:
   void SetUp() override {
     MemoryRunner run(circuit_config(), folder_ / "memory");
-    while (run.process(small_frames())) {
+    while (run.process(circuit_frames())) {
     }
     events_ = run.events();
     ASSERT_TRUE(run.finish());
@@ -51,7 +51,7 @@ TEST_F(HistoryOfARun, StateAtEveryEvent) {
 }
 
 TEST_F(HistoryOfARun, DifferencesNameTheirEvidence) {
-  const StampNs end_ns = small_frames().back().stamp_ns;
+  const StampNs end_ns = circuit_frames().back().stamp_ns;
   const auto all = history_->between(0, end_ns, 0.0);
   EXPECT_EQ(all.size(), expected(end_ns).size());
   for (const Difference& d : all) {
