@@ -40,8 +40,8 @@ std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
   ObjectLibrary& library = ArchiveAccess::library(parts.tracker);
   for (const ObjectId id : library.take_touched()) {
     const LibraryObject* object = std::as_const(library).find(id);
-    add(PieceKind::kObject, to_index(id),
-        object ? archived(*object) : std::vector<std::uint8_t>{}, out);
+    add(PieceKind::kObject, to_index(id), object ? archived(*object) : std::vector<std::uint8_t>{},
+        out);
   }
   ViewMemory& views = ArchiveAccess::views(parts.tracker);
   for (const std::uint64_t key : views.take_changed()) {

@@ -82,9 +82,9 @@ TEST_F(HistoryOfARun, LifeOfEachObject) {
       own += life[i].event.object == id;
       if (i > 0) EXPECT_LT(life[i - 1].event.sequence, life[i].event.sequence);
     }
-    EXPECT_EQ(own, static_cast<std::size_t>(std::count_if(
-                       events_.begin(), events_.end(),
-                       [&](const ObjectEvent& e) { return e.object == id; })));
+    EXPECT_EQ(own, static_cast<std::size_t>(
+                       std::count_if(events_.begin(), events_.end(),
+                                     [&](const ObjectEvent& e) { return e.object == id; })));
     told += own;
   }
   EXPECT_EQ(told, events_.size());
