@@ -37,8 +37,9 @@ MapMemory::MapMemory(const MapMemoryOptions& options, const PipelineConfig& conf
   memory_->restore(pipeline, publisher);
   if (options.resume && memory_->holds_something()) {
     if (memory_->progress().empty()) {
-      throw InputError(folder_.string() + ": was last written by a node, whose run has no inputs "
-                                          "that can be taken up again");
+      throw InputError(folder_.string() +
+                       ": was last written by a node, whose run has no inputs "
+                       "that can be taken up again");
     }
     LoadArchive a(memory_->progress(), folder_.string() + ": progress");
     archive(a, progress_);
@@ -90,8 +91,8 @@ std::optional<std::string> MapMemory::take_problem() {
   const bool first = failures_told_ == 0;
   failures_told_ = status.failures;
   if (!first && !status.stopped) return std::nullopt;
-  return status.problem + (status.stopped ? ": nothing is kept from here on"
-                                          : ": what changed waits to be kept");
+  return status.problem +
+         (status.stopped ? ": nothing is kept from here on" : ": what changed waits to be kept");
 }
 
 }  // namespace pocd

@@ -23,8 +23,7 @@ void show(const CLI::App& app, const Options& options) {
     const auto name = names.find(id);
     return name == names.end() ? "class_" + std::to_string(id) : name->second;
   };
-  const auto format =
-      options.format == "json" ? pocd::TableFormat::kJson : pocd::TableFormat::kCsv;
+  const auto format = options.format == "json" ? pocd::TableFormat::kJson : pocd::TableFormat::kCsv;
   const auto add_event = [&](pocd::HistoryTable& table, const pocd::LoggedEvent& logged) {
     table.row(to_string(logged.event.kind), logged, name_of(logged.event.class_id),
               logged.event.previous_box);
@@ -34,8 +33,8 @@ void show(const CLI::App& app, const Options& options) {
     pocd::HistoryTable table(std::cout, format);
     for (const auto& entry : state) add_event(table, entry.second);
   } else if (app.got_subcommand("diff")) {
-    const auto list = history.between(pocd::parse_time(options.from),
-                                      pocd::parse_time(options.to), options.least_m);
+    const auto list = history.between(pocd::parse_time(options.from), pocd::parse_time(options.to),
+                                      options.least_m);
     pocd::HistoryTable table(std::cout, format);
     for (const pocd::Difference& d : list) {
       table.row(to_string(d.kind), d.evidence, name_of(d.evidence.event.class_id), d.before);

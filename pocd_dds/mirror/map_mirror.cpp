@@ -200,10 +200,8 @@ void MapMirror::Impl::take_manifests() {
     }
     // A run has one writer as long as it lives.
     if (manifest && manifest->epoch() == message.epoch() && meta.writer != manifest_writer) {
-      char text[64];
-      std::snprintf(text, sizeof text, "epoch %016llx names two runs",
-                    static_cast<unsigned long long>(message.epoch()));
-      problems.count(manifests.topic(), "epoch_reused", text, 1);
+      problems.count(manifests.topic(), "epoch_reused",
+                     "epoch " + std::to_string(message.epoch()) + " names two runs", 1);
       follower.forget();
     }
     manifest_writer = meta.writer;

@@ -41,8 +41,8 @@ void EventFeed::answer(const pocd_msgs::msg::EventsRequest& request) {
         for (const LoggedRun& run : log_->runs()) epoch_of_run_[run.run] = run.epoch;
       }
       const MapRun run{request.map_id(), epoch_of_run_[logged.run], log_->lineage()};
-      reply.events().push_back(event_message(logged.event, run, config_.pipeline.classes,
-                                             config_.node.map_frame));
+      reply.events().push_back(
+          event_message(logged.event, run, config_.pipeline.classes, config_.node.map_frame));
     }
   } catch (const InputError& error) {
     log_.reset();

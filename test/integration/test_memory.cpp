@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "bus_harness.hpp"
+#include "pocd/common/check.hpp"
 #include "pocd/memory/memory_reader.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
@@ -108,7 +109,8 @@ TEST_F(NodeMemoryTest, AKilledNodeGoesOnAndFollowersKeepTheirObjects) {
     first.wait();
   }
   ASSERT_TRUE(MemoryReader(folder()).verify().empty());
-  const std::uint64_t snapshots = mirror.status().snapshots_taken, gathered = mirror.status().gathered;
+  const std::uint64_t snapshots = mirror.status().snapshots_taken,
+                      gathered = mirror.status().gathered;
   Process second(node({"--epoch", "2"}));
   const auto taken_over = [](const MirrorStatus& s) { return s.in_step && s.epoch == 2; };
   ASSERT_TRUE(mirror.wait_until(taken_over, kGenerous)) << mirror.status().stale_because;
@@ -199,7 +201,8 @@ TEST_F(NodeMemoryTest, EventsSinceANumberAcrossRestarts) {
 
 TEST_F(NodeMemoryTest, ASecondNodeOnTheFolderIsRefused) {
   Process first(node());
-  ASSERT_TRUE(eventually([&] { return first.err().find("running on domain") != std::string::npos; }));
+  ASSERT_TRUE(
+      eventually([&] { return first.err().find("running on domain") != std::string::npos; }));
   const CommandResult second = run_command(node({"--set", "node.map_id=2"}));
   EXPECT_EQ(second.exit_code, 1);
   EXPECT_NE(second.err.find("is in use by process " + std::to_string(first.pid())),
@@ -213,7 +216,8 @@ TEST_F(NodeMemoryTest, AnEpochThatIsUsedAgainIsNoticed) {
   MapMirror mirror(on(domain_));
   const auto whole = [](const MirrorStatus& s) { return s.in_step && s.version > 3; };
   {
-    Process first(node_command(domain_, {"--lossless", "--epoch", "5", "--set", "node.map_period_s=0.1"}));
+    Process first(
+        node_command(domain_, {"--lossless", "--epoch", "5", "--set", "node.map_period_s=0.1"}));
     ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "60"})).exit_code, 0);
     ASSERT_TRUE(mirror.wait_until(whole, kGenerous));
     first.signal(SIGKILL);
@@ -225,7 +229,8 @@ TEST_F(NodeMemoryTest, AnEpochThatIsUsedAgainIsNoticed) {
   EXPECT_TRUE(mirror.wait_until(noticed, kGenerous)) << mirror.status().stale_because;
   ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "10"})).exit_code, 0);
   EXPECT_TRUE(mirror.wait_until(
-      [&](const MirrorStatus& s) { return s.in_step && s.version > 0 && s.version < version; }, kGenerous))
+      [&](const MirrorStatus& s) { return s.in_step && s.version > 0 && s.version < version; },
+      kGenerous))
       << mirror.status().stale_because;
   again.signal(SIGINT);
   EXPECT_EQ(again.wait().exit_code, 0);

@@ -34,8 +34,8 @@ std::uint64_t row_sum(std::uint64_t key, const void* data, std::size_t size) {
 
 Statement::Statement(Database& database, const char* query) : database_(&database) {
   sqlite3_stmt* raw = nullptr;
-  const int result = sqlite3_prepare_v3(database.handle(), query, -1, SQLITE_PREPARE_PERSISTENT,
-                                        &raw, nullptr);
+  const int result =
+      sqlite3_prepare_v3(database.handle(), query, -1, SQLITE_PREPARE_PERSISTENT, &raw, nullptr);
   statement_.reset(raw);
   if (result != SQLITE_OK) database.fail("cannot be read");
 }
@@ -95,16 +95,16 @@ std::vector<std::uint8_t> Statement::blob(int column) const {
 }
 
 Database::Database(const std::filesystem::path& file, Access access) : name_(file.string()) {
-  const int flags = access == Access::kRead ? SQLITE_OPEN_READONLY
-                                            : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int flags =
+      access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   sqlite3* raw = nullptr;
   const int result = sqlite3_open_v2(file.c_str(), &raw, flags | SQLITE_OPEN_NOMUTEX, nullptr);
   database_.reset(raw);
   if (result != SQLITE_OK) {
     const int why = raw ? sqlite3_system_errno(raw) : 0;
-    throw DatabaseError(name_ + ": cannot be opened: " +
-                            (why != 0 ? std::strerror(why) : sqlite3_errstr(result)),
-                        result);
+    throw DatabaseError(
+        name_ + ": cannot be opened: " + (why != 0 ? std::strerror(why) : sqlite3_errstr(result)),
+        result);
   }
   sqlite3_extended_result_codes(raw, 1);
   sqlite3_busy_timeout(raw, kWait_ms);

@@ -87,8 +87,8 @@ std::vector<Difference> History::between(StampNs from_ns, StampNs to_ns, double 
   for (const auto& [id, then] : before) {
     if (after.count(id) > 0) continue;
     const auto why = gone.find(id);
-    list.push_back({DifferenceKind::kRemoved, why == gone.end() ? then : why->second,
-                    then.event.box});
+    list.push_back(
+        {DifferenceKind::kRemoved, why == gone.end() ? then : why->second, then.event.box});
   }
   return list;
 }

@@ -93,29 +93,30 @@ Loaded load(Database& database, const StoredState& state) {
                     },
                     refuse));
   // The 64 tiles of a region follow each other.
-  check(kVoxelIndex,
-        read_rows(
-            database, kVoxelIndex,
-            [&](std::int64_t key, std::vector<std::uint8_t> data) {
-              const auto [mask, owners] = index_row(data, "index");
-              const TileKey tile = tile_of(key);
-              const BlockKey region{tile.x >> 2, tile.y >> 2, tile.z >> 2};
-              if (loaded.regions.empty() || !(loaded.regions.back().key == region)) {
-                loaded.regions.push_back({region, {}, {}});
-              }
-              StoredRegion& stored = loaded.regions.back();
-              for (int i = 0; i < 8; ++i) {
-                if (!(mask >> i & 1)) continue;
-                const int x = 2 * (tile.x & 3) + (i & 1), y = 2 * (tile.y & 3) + (i >> 1 & 1),
-                          z = 2 * (tile.z & 3) + (i >> 2);
-                stored.present.set(static_cast<std::size_t>(x + 8 * (y + 8 * z)));
-              }
-              for (const std::uint32_t owner : owners) {
-                auto& all = stored.owners;
-                if (std::find(all.begin(), all.end(), owner) == all.end()) all.push_back(owner);
-              }
-            },
-            refuse));
+  check(kVoxelIndex, read_rows(
+                         database, kVoxelIndex,
+                         [&](std::int64_t key, std::vector<std::uint8_t> data) {
+                           const auto [mask, owners] = index_row(data, "index");
+                           const TileKey tile = tile_of(key);
+                           const BlockKey region{tile.x >> 2, tile.y >> 2, tile.z >> 2};
+                           if (loaded.regions.empty() || !(loaded.regions.back().key == region)) {
+                             loaded.regions.push_back({region, {}, {}});
+                           }
+                           StoredRegion& stored = loaded.regions.back();
+                           for (int i = 0; i < 8; ++i) {
+                             if (!(mask >> i & 1)) continue;
+                             const int x = 2 * (tile.x & 3) + (i & 1),
+                                       y = 2 * (tile.y & 3) + (i >> 1 & 1),
+                                       z = 2 * (tile.z & 3) + (i >> 2);
+                             stored.present.set(static_cast<std::size_t>(x + 8 * (y + 8 * z)));
+                           }
+                           for (const std::uint32_t owner : owners) {
+                             auto& all = stored.owners;
+                             if (std::find(all.begin(), all.end(), owner) == all.end())
+                               all.push_back(owner);
+                           }
+                         },
+                         refuse));
   return loaded;
 }
 

@@ -135,8 +135,8 @@ std::pair<std::uint64_t, std::uint64_t> MemoryReader::range() {
   return reading([&] {
     // One aggregate each: SQLite finds either end without reading what is between.
     const auto end = [&](const char* which) {
-      return static_cast<std::uint64_t>(impl_->database.number(
-          std::string("SELECT ifnull(") + which + "(seq), 0) FROM events"));
+      return static_cast<std::uint64_t>(
+          impl_->database.number(std::string("SELECT ifnull(") + which + "(seq), 0) FROM events"));
     };
     return std::pair(end("min"), end("max"));
   });

@@ -29,8 +29,9 @@ StepWriter::StepWriter(Database& database, const MemoryConfig& config, StoredSta
       config_(config),
       state_(std::move(state)),
       put_event_(database, "INSERT OR REPLACE INTO events VALUES(?1, ?2, ?3, ?4, ?5, ?6)"),
-      oldest_event_(database,
-                    "SELECT seq, stamp_ns, object, run, sum, data FROM events ORDER BY seq LIMIT 1"),
+      oldest_event_(
+          database,
+          "SELECT seq, stamp_ns, object, run, sum, data FROM events ORDER BY seq LIMIT 1"),
       drop_event_(database, "DELETE FROM events WHERE seq = ?1"),
       put_standing_(database, "INSERT OR REPLACE INTO standing VALUES(?1, ?2, ?3, ?4, ?5)"),
       drop_standing_(database, "DELETE FROM standing WHERE object = ?1"),

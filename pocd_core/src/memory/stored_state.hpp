@@ -79,10 +79,10 @@ void archive(Archive& a, StoredState& s) {
 /// Voxels and published form of one tile at one step.
 struct TileStep {
   TileKey key;
-  std::uint8_t mask = 0;     ///< blocks there are
-  std::size_t first = 0;     ///< of them, in MemoryStep::blocks
+  std::uint8_t mask = 0;  ///< blocks there are
+  std::size_t first = 0;  ///< of them, in MemoryStep::blocks
   std::uint64_t version = 0;
-  TilePayload payload;       ///< empty: nothing is published of it
+  TilePayload payload;  ///< empty: nothing is published of it
 };
 
 /// Everything that one transaction writes.

@@ -131,7 +131,8 @@ void decode_voxels(const TileKey& key, std::uint8_t mask, const std::vector<std:
       block.tsdf[i] = static_cast<std::int16_t>(before);
       block.weight[i] = static_cast<std::uint16_t>(weight[v] | weight[n + v] << 8);
       if (p == 0) continue;
-      const std::size_t k = p < 256 ? index[v] : static_cast<std::size_t>(index[v] | index[n + v] << 8);
+      const std::size_t k =
+          p < 256 ? index[v] : static_cast<std::size_t>(index[v] | index[n + v] << 8);
       if (k > p) throw InputError(source + ": a voxel has an owner that is not listed");
       block.owner[i] = owners[k];
     }

@@ -58,8 +58,8 @@ std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
   ObjectLibrary& library = ArchiveAccess::library(parts.tracker);
   for (const ObjectId id : library.take_touched()) {
     const LibraryObject* object = std::as_const(library).find(id);
-    add(PieceKind::kObject, to_index(id),
-        object ? archived(*object) : std::vector<std::uint8_t>{}, out);
+    add(PieceKind::kObject, to_index(id), object ? archived(*object) : std::vector<std::uint8_t>{},
+        out);
   }
   FreeSpace& space = ArchiveAccess::free_space(parts.tracker);
   for (const BlockKey& key : space.take_changed()) {

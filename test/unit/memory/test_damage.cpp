@@ -66,12 +66,14 @@ TEST_P(OneDefect, IsRefusedAndNamed) {
 INSTANTIATE_TEST_SUITE_P(
     Each, OneDefect,
     ::testing::Values(
-        Defect{"Object", "UPDATE objects SET data = zeroblob(20) WHERE key = (SELECT min(key) FROM objects)",
+        Defect{"Object",
+               "UPDATE objects SET data = zeroblob(20) WHERE key = (SELECT min(key) FROM objects)",
                "of objects is damaged"},
         Defect{"Part", "UPDATE parts SET sum = sum + 1 WHERE key = 1", "row 1 of parts is damaged"},
         Defect{"PartMissing", "DELETE FROM parts WHERE key = 2", "parts has 2 rows"},
         Defect{"ObjectMissing", "DELETE FROM objects WHERE key = (SELECT max(key) FROM objects)",
                "objects has"},
+<<<<<<< HEAD
         Defect{"ObjectExchanged",
                "UPDATE objects SET data = (SELECT data FROM objects ORDER BY key DESC LIMIT 1), sum = "
                "(SELECT sum FROM objects ORDER BY key DESC LIMIT 1) WHERE key = (SELECT min(key) FROM "
@@ -81,23 +83,46 @@ INSTANTIATE_TEST_SUITE_P(
                "of free_space is damaged"},
         Defect{"FreeSpaceMissing", "DELETE FROM free_space WHERE key = (SELECT min(key) FROM free_space)", "free_space has"},
         Defect{"Tile", "UPDATE tiles SET data = zeroblob(99) WHERE key = (SELECT min(key) FROM tiles)",
+=======
+        Defect{
+            "ObjectExchanged",
+            "UPDATE objects SET data = (SELECT data FROM objects ORDER BY key DESC LIMIT 1), sum = "
+            "(SELECT sum FROM objects ORDER BY key DESC LIMIT 1) WHERE key = (SELECT min(key) FROM "
+            "objects)",
+            "of objects is damaged"},
+        Defect{"View",
+               "UPDATE views SET data = substr(data, 2) WHERE key = (SELECT min(key) FROM views)",
+               "of views is damaged"},
+        Defect{"ViewMissing", "DELETE FROM views WHERE key = (SELECT min(key) FROM views)",
+               "views has"},
+        Defect{"Tile",
+               "UPDATE tiles SET data = zeroblob(99) WHERE key = (SELECT min(key) FROM tiles)",
+>>>>>>> memory
                "of tiles is damaged"},
-        Defect{"TileMissing", "DELETE FROM tiles WHERE key = (SELECT min(key) FROM tiles)", "tiles has"},
-        Defect{"Index", "UPDATE voxel_index SET data = zeroblob(5) WHERE key = (SELECT min(key) FROM voxel_index)",
+        Defect{"TileMissing", "DELETE FROM tiles WHERE key = (SELECT min(key) FROM tiles)",
+               "tiles has"},
+        Defect{"Index",
+               "UPDATE voxel_index SET data = zeroblob(5) WHERE key = (SELECT min(key) FROM "
+               "voxel_index)",
                "of voxel_index is damaged"},
-        Defect{"IndexMissing", "DELETE FROM voxel_index WHERE key = (SELECT max(key) FROM voxel_index)",
+        Defect{"IndexMissing",
+               "DELETE FROM voxel_index WHERE key = (SELECT max(key) FROM voxel_index)",
                "voxel_index has"},
-        Defect{"State", "UPDATE state SET data = substr(data, 1, 40)", "state of the last step is damaged"},
+        Defect{"State", "UPDATE state SET data = substr(data, 1, 40)",
+               "state of the last step is damaged"},
         Defect{"Lineage", "DELETE FROM meta WHERE name = 'lineage'", "has no lineage"}),
     [](const auto& info) { return info.param.name; });
 
 TEST_F(DamagedMemory, VoxelsThatCannotBeReadAreLostAndStated) {
-  damage("UPDATE voxels SET data = zeroblob(50) WHERE key = (SELECT key FROM voxels LIMIT 1 OFFSET 3)");
+  damage(
+      "UPDATE voxels SET data = zeroblob(50) WHERE key = (SELECT key FROM voxels LIMIT 1 OFFSET "
+      "3)");
   EXPECT_NE(verify().find("of voxels is damaged"), std::string::npos);
   MemoryRunner run(circuit_config(), folder_ / "memory");
   const MapDigest before = run.publisher().digest();
   std::string told;
-  for (const BlockKey& key : run.pipeline().map().keys_by_region()) run.pipeline().map().recall(key);
+  for (const BlockKey& key : run.pipeline().map().keys_by_region())
+    run.pipeline().map().recall(key);
   if (const auto problem = run.pipeline().map().take_problem()) told = *problem;
   EXPECT_NE(told.find("are lost"), std::string::npos) << told;
   EXPECT_NE(told.find("memory.sqlite"), std::string::npos) << told;
@@ -136,7 +161,8 @@ TEST_F(DamagedMemory, AnyPageThatChangesIsNoticedOrOfNoConsequence) {
   for (int trial = 0; trial < 40; ++trial) {
     std::string bad = good;
     const std::size_t page = random.below(bad.size() / 4096) * 4096;
-    for (int i = 0; i < 64; ++i) bad[page + random.below(4096)] = static_cast<char>(random.below(256));
+    for (int i = 0; i < 64; ++i)
+      bad[page + random.below(4096)] = static_cast<char>(random.below(256));
     std::ofstream(file, std::ios::binary | std::ios::trunc) << bad;
     std::filesystem::remove(file.string() + "-wal");
     std::filesystem::remove(file.string() + "-shm");

@@ -32,8 +32,9 @@ int run_to_the_end(const std::filesystem::path& folder, std::atomic<std::uint64_
 /// Waits until the child has made so many steps, or has ended.
 void wait_for_steps(pid_t child, const std::atomic<std::uint64_t>& steps, std::uint64_t wanted) {
   siginfo_t info{};
-  while (steps < wanted && ::waitid(P_PID, static_cast<id_t>(child), &info,
-                                    WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0) {
+  while (steps < wanted &&
+         ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         info.si_pid == 0) {
     ::usleep(200);
   }
 }

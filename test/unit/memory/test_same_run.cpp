@@ -10,7 +10,8 @@ std::vector<std::string> stored_pieces(const std::filesystem::path& folder) {
   memory::Database database(folder / memory::kFileName, memory::Database::Access::kRead);
   std::vector<std::string> rows;
   for (const char* table : {"parts", "objects", "free_space", "tiles", "voxel_index", "voxels"}) {
-    memory::Statement all(database, (std::string("SELECT key, data FROM ") + table + " ORDER BY key").c_str());
+    memory::Statement all(
+        database, (std::string("SELECT key, data FROM ") + table + " ORDER BY key").c_str());
     while (all.step()) {
       const std::vector<std::uint8_t> data = all.blob(1);
       std::size_t skip = std::string(table) == "tiles" ? 8 : 0;  // the version counts steps

@@ -59,7 +59,9 @@ TEST(VoxelPage, DamagedBytesAreRefused) {
 
 TEST(VoxelPage, RowsNameTilesAndThoseOfARegionFollowEachOther) {
   Random random(3);
-  const auto coordinate = [&] { return static_cast<std::int32_t>(random.below(1 << 20)) - (1 << 19); };
+  const auto coordinate = [&] {
+    return static_cast<std::int32_t>(random.below(1 << 20)) - (1 << 19);
+  };
   for (int trial = 0; trial < 10000; ++trial) {
     const TileKey tile{coordinate(), coordinate(), coordinate()};
     const std::int64_t row = row_of(tile);

@@ -3,8 +3,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <sched.h>
+#include <csignal>
 
 #include "memory/database.hpp"
 #include "memory/schema.hpp"
@@ -177,8 +177,9 @@ TEST(WarehouseMemory, IsSmallerAfterItWasCompacted) {
   make_memory(folder / "memory", 60);
   {
     memory::Database database(folder / "memory/memory.sqlite", memory::Database::Access::kWrite);
-    database.execute("CREATE TABLE room(data BLOB); INSERT INTO room VALUES(zeroblob(3000000));"
-                     "DROP TABLE room; PRAGMA wal_checkpoint(TRUNCATE)");
+    database.execute(
+        "CREATE TABLE room(data BLOB); INSERT INTO room VALUES(zeroblob(3000000));"
+        "DROP TABLE room; PRAGMA wal_checkpoint(TRUNCATE)");
   }
   const auto before = std::filesystem::file_size(folder / "memory/memory.sqlite");
   compact_memory(folder / "memory");

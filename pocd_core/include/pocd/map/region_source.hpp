@@ -13,8 +13,8 @@ namespace pocd {
 struct StoredRegion {
   static constexpr int kBlocks = 1 << (3 * BlockKey::kRegionShift);
 
-  BlockKey key;                  ///< block key >> kRegionShift
-  std::bitset<kBlocks> present;  ///< by the block's number within the region, x fastest
+  BlockKey key;                       ///< block key >> kRegionShift
+  std::bitset<kBlocks> present;       ///< by the block's number within the region, x fastest
   std::vector<std::uint32_t> owners;  ///< whose voxels may be there, background left out
 };
 

@@ -17,8 +17,8 @@ const char* to_string(DifferenceKind kind);  ///< "ADDED", "MOVED", "CHANGED", "
 
 struct Difference {
   DifferenceKind kind = DifferenceKind::kAdded;
-  LoggedEvent evidence;                ///< the last event that made it so
-  std::optional<OrientedBox> before;   ///< where it stood at the first time; none: ADDED
+  LoggedEvent evidence;               ///< the last event that made it so
+  std::optional<OrientedBox> before;  ///< where it stood at the first time; none: ADDED
 };
 
 /// Reads the log in steps; memory follows the number of objects. Not thread-safe.

@@ -24,7 +24,7 @@ struct LoggedRun {
   std::int64_t run = 0;
   std::uint64_t epoch = 0;  ///< 0: it was not on a bus
   std::string program;
-  StampNs started_ns = 0;  ///< wall clock
+  StampNs started_ns = 0;         ///< wall clock
   std::uint64_t first_event = 0;  ///< the first one that may be of this run
   bool ended = false;             ///< in order
 };

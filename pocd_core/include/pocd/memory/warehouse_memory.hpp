@@ -16,9 +16,9 @@ namespace pocd {
 
 /// A run that writes to a memory.
 struct MemoryRun {
-  std::uint64_t epoch = 0;   ///< its name on the bus; 0: it has none
-  std::string program;       ///< name and version
-  StampNs started_ns = 0;    ///< wall clock
+  std::uint64_t epoch = 0;  ///< its name on the bus; 0: it has none
+  std::string program;      ///< name and version
+  StampNs started_ns = 0;   ///< wall clock
 };
 
 /// Counts are of this run.
