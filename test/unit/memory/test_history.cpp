@@ -80,7 +80,9 @@ TEST_F(HistoryOfARun, LifeOfEachObject) {
     std::size_t own = 0;
     for (std::size_t i = 0; i < life.size(); ++i) {
       own += life[i].event.object == id;
-      if (i > 0) EXPECT_LT(life[i - 1].event.sequence, life[i].event.sequence);
+      if (i > 0) {
+        EXPECT_LT(life[i - 1].event.sequence, life[i].event.sequence);
+      }
     }
     EXPECT_EQ(own, static_cast<std::size_t>(
                        std::count_if(events_.begin(), events_.end(),

@@ -114,7 +114,9 @@ TEST(KilledMemory, HoldsAStateThatWasAndGoesOnToTheSameEnd) {
     }
   }
   EXPECT_GT(steps_found, wanted / 4);
-  if (wanted >= 100) EXPECT_GT(ends, 0);
+  if (wanted >= 100) {
+    EXPECT_GT(ends, 0);
+  }
   ::munmap(shared, sizeof(std::atomic<std::uint64_t>));
   RecordProperty("kills", kills);
   RecordProperty("runs_to_the_end", ends);
