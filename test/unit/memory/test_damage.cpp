@@ -73,31 +73,21 @@ INSTANTIATE_TEST_SUITE_P(
         Defect{"PartMissing", "DELETE FROM parts WHERE key = 2", "parts has 2 rows"},
         Defect{"ObjectMissing", "DELETE FROM objects WHERE key = (SELECT max(key) FROM objects)",
                "objects has"},
-<<<<<<< HEAD
-        Defect{"ObjectExchanged",
-               "UPDATE objects SET data = (SELECT data FROM objects ORDER BY key DESC LIMIT 1), sum = "
-               "(SELECT sum FROM objects ORDER BY key DESC LIMIT 1) WHERE key = (SELECT min(key) FROM "
-               "objects)",
-               "of objects is damaged"},
-        Defect{"FreeSpace", "UPDATE free_space SET data = substr(data, 2) WHERE key = (SELECT min(key) FROM free_space)",
-               "of free_space is damaged"},
-        Defect{"FreeSpaceMissing", "DELETE FROM free_space WHERE key = (SELECT min(key) FROM free_space)", "free_space has"},
-        Defect{"Tile", "UPDATE tiles SET data = zeroblob(99) WHERE key = (SELECT min(key) FROM tiles)",
-=======
         Defect{
             "ObjectExchanged",
             "UPDATE objects SET data = (SELECT data FROM objects ORDER BY key DESC LIMIT 1), sum = "
             "(SELECT sum FROM objects ORDER BY key DESC LIMIT 1) WHERE key = (SELECT min(key) FROM "
             "objects)",
             "of objects is damaged"},
-        Defect{"View",
-               "UPDATE views SET data = substr(data, 2) WHERE key = (SELECT min(key) FROM views)",
-               "of views is damaged"},
-        Defect{"ViewMissing", "DELETE FROM views WHERE key = (SELECT min(key) FROM views)",
-               "views has"},
+        Defect{"FreeSpace",
+               "UPDATE free_space SET data = substr(data, 2) WHERE key = (SELECT min(key) FROM "
+               "free_space)",
+               "of free_space is damaged"},
+        Defect{"FreeSpaceMissing",
+               "DELETE FROM free_space WHERE key = (SELECT min(key) FROM free_space)",
+               "free_space has"},
         Defect{"Tile",
                "UPDATE tiles SET data = zeroblob(99) WHERE key = (SELECT min(key) FROM tiles)",
->>>>>>> memory
                "of tiles is damaged"},
         Defect{"TileMissing", "DELETE FROM tiles WHERE key = (SELECT min(key) FROM tiles)",
                "tiles has"},
