@@ -14,6 +14,8 @@
 namespace {
 
 using namespace pocd::dds;  // NOLINT: this file is about nothing else
+using pocd::NodeConfig;
+using pocd::NodeFile;
 
 struct DoctorOptions {
   BusOptions bus;
