@@ -1,6 +1,7 @@
 // Payloads of the ROS messages that frames are made of, as a sender would write them.
 #pragma once
 
+#include <algorithm>
 #include <opencv2/core/mat.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -42,10 +43,10 @@ inline Bytes image_payload(StampNs stamp_ns, const std::string& frame, const std
 /// As image_transport's compressedDepth: 12 bytes of header, then PNG.
 inline Bytes compressed_depth_payload(StampNs stamp_ns, const std::string& frame,
                                       const cv::Mat& depth) {
-  std::vector<std::uint8_t> data, png;
+  std::vector<std::uint8_t> png;
   cv::imencode(".png", depth, png);
-  data.assign(12, 0);
-  data.insert(data.end(), png.begin(), png.end());
+  std::vector<std::uint8_t> data(12 + png.size(), 0);
+  std::copy(png.begin(), png.end(), data.begin() + 12);
   CdrWriter out;
   put_header(out, stamp_ns, frame);
   out.string("16UC1; compressedDepth");

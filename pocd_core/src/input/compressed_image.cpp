@@ -1,5 +1,7 @@
 #include "compressed_image.hpp"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -45,6 +47,21 @@ Size png_size(const Bytes& bytes) {
   return {big_endian(bytes.data + 16, 4), big_endian(bytes.data + 20, 4)};
 }
 
+/// Whether all chunks are there and have their sums: libpng would say otherwise on stderr, for
+/// every image.
+bool png_is_whole(const Bytes& bytes) {
+  for (std::size_t at = sizeof kPng; bytes.size - at >= 12;) {
+    const std::uint8_t* chunk = bytes.data + at;
+    const std::size_t length = big_endian(chunk, 4);
+    if (length > bytes.size - at - 12) return false;
+    const uLong sum = ::crc32(0, chunk + 4, static_cast<uInt>(length + 4));
+    if (sum != big_endian(chunk + 8 + length, 4)) return false;
+    if (std::memcmp(chunk + 4, "IEND", 4) == 0) return true;
+    at += 12 + length;
+  }
+  return false;
+}
+
 /// Of the first frame header; 0 when there is none.
 Size jpeg_size(const Bytes& bytes) {
   for (std::size_t at = 2; at + 9 < bytes.size && bytes.data[at] == 0xFF;) {
@@ -67,6 +84,7 @@ Checked<Picture> decode(const ImageView& image, const Bytes& bytes) {
     return {InputReason::kTooLarge,
             "image is " + std::to_string(size.width) + "x" + std::to_string(size.height)};
   }
+  if (png && !png_is_whole(bytes)) return damaged(image, "its PNG is cut off or damaged");
   Picture picture;
   picture.lossy = !png;
   try {

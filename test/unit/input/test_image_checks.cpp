@@ -32,10 +32,10 @@ Bytes picture(const cv::Mat& image, const char* extension) {
 
 /// 12 bytes of header: the quantisation's kind and its two parameters.
 Bytes with_header(float a, float b, const Bytes& rest) {
-  Bytes bytes(12, 0);
+  Bytes bytes(12 + rest.size(), 0);
   std::memcpy(bytes.data() + 4, &a, 4);
   std::memcpy(bytes.data() + 8, &b, 4);
-  bytes.insert(bytes.end(), rest.begin(), rest.end());
+  std::copy(rest.begin(), rest.end(), bytes.begin() + 12);
   return bytes;
 }
 
@@ -218,8 +218,8 @@ TEST(LabelImage, PngKeepsIdsAndJpegFindsTheNearestColour) {
   ASSERT_TRUE(jpeg.value);
   EXPECT_EQ(jpeg.value->labels.at<std::uint16_t>(4, 4), 7);
   EXPECT_EQ(jpeg.value->labels.at<std::uint16_t>(28, 4), 300);
-  // The rows of blocks meet at 16, so hardly any pixel is a mixture.
-  EXPECT_LT(jpeg.value->unknown_pixels, 64u);
+  // Colour has half the resolution: a row on each side of the edge is a mixture.
+  EXPECT_LE(jpeg.value->unknown_pixels, 64u);
 }
 
 TEST(ResizedTo, TakesThePixelBelowTheCentre) {
