@@ -126,12 +126,6 @@ void ObjectTracker::look_at_objects(Step& step) {
           config_.association, kNoiseShare * step.sight.margin_m, looks_.data(), step.look_count,
           looks_[n]);
   }
-  for (std::size_t n = 0; n < step.look_count; ++n) {
-    const Look& look = looks_[n];
-    const Sighting& s = look.sighting;
-    if (getenv("DBG") && std::abs(look.object->box.pose.position_W.x()-atof(getenv("DX")))<0.7 && std::abs(look.object->box.pose.position_W.y()-atof(getenv("DY")))<0.7)
-      fprintf(stderr,"%.2f #%u %s hit %d thr %d occ %d unk %d tot %d contested %d fits %d verdict %s disp %.3f E %.2f arr %s\n",(step.frame.stamp_ns/1e9-1000),to_index(look.object->id),look.object->confirmed?"C":"t",s.hit,s.seen_through,s.occluded,s.unknown,s.total,look.contested,look.fits,to_string(look.verdict),look.displacement_m,look.object->belief.stationarity(),to_string(look.object->arrival));
-  }
   PartsConfig parts;
   parts.spacing_m = config_.map.voxel_size_m;
   parts.contact_m = config_.segmentation.cluster_tolerance_m;
