@@ -114,7 +114,7 @@ POCD_KERNEL bool average(float truncation, float voxel, float max_weight, float 
     const std::int32_t is_free = t_new >= kFreeTsdf ? -1 : 0;
     const float cap = is_free ? free_weight : max_weight;
     const float grown = w + 1.0f < cap ? w + 1.0f : cap;
-    const std::int32_t w_new = static_cast<std::int32_t>(apply ? grown : w);
+    const std::int32_t w_new = apply ? static_cast<std::int32_t>(grown) : w_old;
     tsdf[i] = static_cast<std::int16_t>(t_new);
     weight[i] = static_cast<std::uint16_t>(w_new);
     const std::int32_t changed = (t_new ^ t_old) | (w_new ^ w_old);
