@@ -186,7 +186,8 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   survivor.model.absorb(absorbed.model);
   survivor.icp_target.reset();
   survivor.most_surfels = std::max(survivor.most_surfels, survivor.model.surfels().size());
-  survivor.observations += absorbed.observations;
+  // Both were seen in the same looks, for the most part.
+  survivor.observations = std::max(survivor.observations, absorbed.observations);
   survivor.seen_by.insert(absorbed.seen_by.begin(), absorbed.seen_by.end());
   survivor.in_place_ns = std::max(survivor.in_place_ns, absorbed.in_place_ns);
   survivor.last_seen_ns = std::max(survivor.last_seen_ns, absorbed.last_seen_ns);
@@ -399,6 +400,7 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string&
   departure.evidence = evidence_of(step, object);
   const bool was_known = object.confirmed;
   clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
+  step.map.reassign_object(object.id, ObjectId::kNone);  // what stays is not of it
   std::replace(step.owners.begin(), step.owners.end(), object.id, ObjectId::kNone);
   for (std::size_t n = 0; n < step.look_count; ++n) {
     if (looks_[n].object == &object) looks_[n].sighting.sights.clear();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "pocd/change/geometric_change.hpp"
@@ -283,6 +284,10 @@ LibraryObject& ObjectTracker::create(Step& step, ClassId class_id) {
   object.belief.beta = (1.0 - config_.state.initial_stationarity) * config_.state.initial_count;
   object.first_seen_ns = step.frame.stamp_ns;
   object.in_place_ns = step.frame.stamp_ns;
+  // Another view of this moment tells nothing of what the object does between two moments.
+  Moment& moment = moment_of(step, object);
+  moment.measured = true;
+  moment.points = std::numeric_limits<int>::max();
   return object;
 }
 
