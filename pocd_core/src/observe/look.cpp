@@ -161,7 +161,8 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
   for (const SurfacePoint& p : observations.list[look.observation].points) {
     if (!is_inside(object.box, config.icp_max_distance_m, p.point_W)) continue;
     const bool of_another = std::any_of(looks, looks + count, [&](const Look& other) {
-      return other.object != &object && other.verdict == Verdict::kInPlace && !other.contested &&
+      return other.object != &object && other.object->confirmed &&
+             other.verdict == Verdict::kInPlace && !other.contested &&
              other.object->arrival != Arrival::kArrived &&
              is_inside(other.object->box, spacing_m, p.point_W) &&
              other.object->model.nearest(p.point_W, static_cast<float>(1.5 * spacing_m)) !=

@@ -137,6 +137,27 @@ TEST(PipelineChanges, SmallMovesAreMovesToo) {
   }
 }
 
+// A fifth of a metre and more, whichever way, along or across the view: one thing, at another place.
+TEST(PipelineChanges, AThingThatIsPushedKeepsItsIdentity) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    Random random(seed);
+    const double yaw = random.uniform(-0.4, 0.4);
+    const double angle = 2.0 * M_PI * static_cast<double>(seed) / 8.0;
+    const double far_m = random.uniform(0.2, 0.35);
+    const Eigen::Vector2d from(0.0, 2.3),
+        to = from + far_m * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    Drive drive;
+    drive.watch(room_with({solid(kBoxClass, from, kSize, yaw)}), kLearn);
+    drive.watch(room_with({solid(kBoxClass, to, kSize, yaw)}), 2 * kPromptly);
+    const auto moved = drive.of_kind(EventKind::kMoved);
+    ASSERT_EQ(moved.size(), 1u) << far_m << " towards " << angle << "\n" << text(drive.events());
+    EXPECT_LT((moved[0].box.pose.position_W.head<2>() - to).norm(), 0.1);
+    EXPECT_TRUE(drive.of_kind(EventKind::kRemoved).empty()) << text(drive.events());
+    EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 1u) << text(drive.events());
+    EXPECT_EQ(drive.pipeline().objects().size(), 1u);
+  }
+}
+
 TEST(PipelineChanges, NewBoxIsAdded) {
   Drive drive;
   drive.watch(room_with({right_cage()}), kLearn);
