@@ -58,9 +58,15 @@ Cleared cleared_by(const Frame& frame, const FrameResult& result, const Blocks& 
       if (p.z() < 0.2) continue;
       const auto u = std::lround(frame.camera.fx * p.x() / p.z() + frame.camera.cx);
       const auto w = std::lround(frame.camera.fy * p.y() / p.z() + frame.camera.cy);
-      if (u < 0 || w < 0 || u >= frame.camera.width || w >= frame.camera.height) continue;
-      const float depth = frame.depth_m.at<float>(static_cast<int>(w), static_cast<int>(u));
-      cleared.measured += std::abs(depth - p.z()) < 0.75 * voxel_m;
+      if (u < 1 || w < 1 || u >= frame.camera.width - 1 || w >= frame.camera.height - 1) continue;
+      // All around, so that neither the grid's stride nor the refined pose matters.
+      bool measured = true;
+      for (int n = 0; n < 9; ++n) {
+        const float depth = frame.depth_m.at<float>(static_cast<int>(w) + n / 3 - 1,
+                                                    static_cast<int>(u) + n % 3 - 1);
+        measured &= std::abs(depth - p.z()) < 0.75 * voxel_m;
+      }
+      cleared.measured += measured;
     }
   }
   return cleared;
