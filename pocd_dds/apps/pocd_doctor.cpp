@@ -182,7 +182,7 @@ int main(int argc, char** argv) {
   app.add_option("--proc", options.proc, "Where the machine's /proc is")->capture_default_str();
   app.add_option("--shm", options.shared_memory, "Where shared memory is")->capture_default_str();
   int domain = -1;
-  add_bus_options(app, domain, options.bus.profiles_file);
+  add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
     options.bus.domain = domain >= 0 ? domain : default_domain();

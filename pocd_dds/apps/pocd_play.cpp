@@ -128,7 +128,7 @@ int main(int argc, char** argv) {
   app.add_option("--map-frame", options.map_frame, "Frame that the poses are in")
       ->capture_default_str();
   int domain = -1;
-  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
+  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
     const bool has_dataset = app.count("--dataset") > 0 && app.count("--input") > 0;

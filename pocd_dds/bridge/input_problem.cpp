@@ -1,12 +1,12 @@
 #include "pocd_dds/bridge/input_problem.hpp"
 
-#include <spdlog/spdlog.h>
+#include "pocd_dds/entities/bus_log.hpp"
 
 namespace pocd::dds {
 
 ProblemCounter::ProblemCounter()
     : pocd::ProblemCounter(
-          [](const Entry& entry) { spdlog::warn("{} (logged once, counted)", text_of(entry)); }) {}
+          [](const Entry& entry) { log_warning("{} (logged once, counted)", text_of(entry)); }) {}
 
 void ProblemCounter::count_incompatible(RawReader& reader) {
   const std::uint64_t times = reader.take_incompatible();
@@ -18,6 +18,7 @@ void ProblemCounter::count_incompatible(RawReader& reader) {
 
 void ProblemCounter::count_damaged(RawReader& reader) {
   count(reader.topic(), "damaged", "a message that cannot be read", reader.take_damaged());
+  count(reader.topic(), "other_idl", reader.misread_from(), reader.take_misread());
 }
 
 }  // namespace pocd::dds

@@ -13,7 +13,8 @@ class ProblemCounter : public pocd::ProblemCounter {
 
   /// Writers that the reader cannot hear; it has logged that itself.
   void count_incompatible(RawReader& reader);
-  /// Messages that the reader took and could not read. From the thread that takes.
+  /// Messages that the reader took and could not read, or must not, because their writer has
+  /// another version of the type. From the thread that takes.
   void count_damaged(RawReader& reader);
 };
 

@@ -15,6 +15,9 @@ struct Delivery {
   int max_instances = 0;    ///< of keyed topics; 0: not bounded
   bool background = false;  ///< sent, and sent again, by a thread of its own
   double deadline_s = 0.0;  ///< 0: none
+  /// Of keyed topics that keep all: 0: not bounded. Fast DDS makes no reader whose max_samples is
+  /// less than this times max_instances.
+  int max_samples_per_instance = 0;
 };
 
 enum class Direction { kIn, kOut, kBoth };
@@ -52,8 +55,13 @@ inline constexpr TopicSpec kOdometry{input_names::kOdometry, "nav_msgs::msg::dds
                                      Direction::kIn, false, best_effort(20)};
 inline constexpr TopicSpec kTf{input_names::kTf, "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn,
                                false, best_effort(100)};
-inline constexpr TopicSpec kTfStatic{input_names::kTfStatic, "tf2_msgs::msg::dds_::TFMessage_",
-                                     Direction::kIn, false, latched(100)};
+// Every broadcaster says its transforms once and for all: not one sample may make room for another.
+// A reader that is full has the others sent again when it has been emptied.
+inline constexpr TopicSpec kTfStatic{input_names::kTfStatic,
+                                     "tf2_msgs::msg::dds_::TFMessage_",
+                                     Direction::kIn,
+                                     false,
+                                     {true, true, 0, 10000, 0, false, 0}};
 inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kBoth,
                                   false, reliable(1)};
 

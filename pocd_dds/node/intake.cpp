@@ -1,5 +1,6 @@
 #include "pocd_dds/node/intake.hpp"
 
+#include <pthread.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -42,7 +43,7 @@ Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig
       tf_(node.topics.own_tf() ? nullptr
                                : std::make_unique<TransformInput>(
                                      participant, bus_name(node.topics.tf),
-                                     bus_name(node.topics.tf_static), node.lossless, wakeup_)),
+                                     bus_name(node.topics.tf_static), node.lossless, tf_wakeup_)),
       context_{node_, labels_, pipeline.map.max_depth_m, transforms_, problems_},
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
   for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
@@ -63,10 +64,12 @@ void Intake::stop() {
 }
 
 void Intake::run() {
+  pthread_setname_np(pthread_self(), "pocd_intake");
   try {
     while (!stopping_) {
       wakeup_.wait_for(kIdle);
       step(false);
+      pulse_.beat();
     }
     step(true);
   } catch (...) {
@@ -79,17 +82,23 @@ void Intake::run() {
 void Intake::meet(const std::string& name, const RobotConfig& config, bool named) {
   Robot& robot = robots_[name];
   robot.named = named;
+  robot.wakeup = std::make_unique<Wakeup>(wakeup_);
   robot.input = std::make_unique<RobotInput>(participant_, node_, config, context_, problems_,
-                                             wakeup_, latency_);
+                                             *robot.wakeup, latency_);
+  // Setting a fleet up takes time, in which what was latched goes on to arrive.
+  if (tf_) tf_->drain_static(transforms_, problems_);
 }
 
-void Intake::follow_roster() {
+bool Intake::follow_roster() {
   const auto now = Roster::Clock::now();
-  for (const BusEvent& event : watch_.take()) {
+  const std::vector<BusEvent> events = watch_.take();
+  for (const BusEvent& event : events) {
     check_type(event);
     follow(roster_.hear(event, now));
   }
-  follow(roster_.settle(now));
+  const std::vector<RosterChange> settled = roster_.settle(now);
+  follow(settled);
+  return !events.empty() || !settled.empty();
 }
 
 // Fast DDS keeps quiet about it: a writer of another type just never matches.
@@ -161,31 +170,45 @@ void Intake::meet_those_turned_away() {
 }
 
 void Intake::step(bool last) {
-  follow_roster();
+  if (tf_) tf_->drain_static(transforms_, problems_);
+  const bool changed = follow_roster();
+  const auto now = std::chrono::steady_clock::now();
+  // A replay, which holds its senders back, has few robots and many reasons to go on.
+  const bool everyone = last || changed || node_.lossless || now - swept_ >= kIdle;
+  if (everyone) swept_ = now;
+  const bool moved_any = tf_ && (tf_wakeup_.take() || everyone);
+  std::vector<std::string> visited;
   for (auto& [name, robot] : robots_) {
+    if (!(robot.wakeup->take() || everyone || (moved_any && robot.input->waits()))) continue;
+    visited.push_back(name);
     const bool far_ahead = node_.lossless && merger_.pending(name) >= kMostBehind;
     robot.input->look(last        ? RobotInput::Turn::kLast
                       : far_ahead ? RobotInput::Turn::kHold
                                   : RobotInput::Turn::kUsual);
   }
   std::set<std::string> moved;
-  if (tf_) moved = tf_->drain(transforms_, problems_);
-  for (auto it = robots_.begin(); it != robots_.end();) {
-    const auto& [name, robot] = *it;
-    RobotInput& input = *robot.input;
-    input.drain(moved);
-    for (Frame& frame : input.take()) {
-      const StampNs stamp_ns = frame.stamp_ns;
-      merger_.add(name, stamp_ns, std::move(frame));
-    }
-    // A replay may be paused; who is silent on a live bus is not waited for.
-    const bool silent = !node_.lossless && input.silent_s() >= node_.silent_wait_s;
-    merger_.set_live(name, input.live() && !silent);
-    merger_.set_watermark(name, input.watermark_ns());
-    it = see_off(it->second) ? robots_.erase(it) : std::next(it);
+  if (moved_any) moved = tf_->drain(transforms_, problems_);
+  for (const std::string& name : visited) {
+    const auto robot = robots_.find(name);
+    visit(name, *robot->second.input, moved);
+    if (see_off(robot->second)) robots_.erase(robot);
   }
   hand_over(last);
-  update_status();
+  if (everyone) update_status();
+}
+
+void Intake::visit(const std::string& name, RobotInput& input, const std::set<std::string>& moved) {
+  ++visits_;
+  input.drain(moved);
+  for (Frame& frame : input.take()) {
+    const StampNs stamp_ns = frame.stamp_ns;
+    merger_.add(name, stamp_ns, std::move(frame));
+  }
+  if (merger_.pending(name) >= kMostBehind) far_ahead_.insert(name);
+  // A replay may be paused; who is silent on a live bus is not waited for.
+  const bool silent = !node_.lossless && input.silent_s() >= node_.silent_wait_s;
+  merger_.set_live(name, input.live() && !silent);
+  merger_.set_watermark(name, input.watermark_ns());
 }
 
 bool Intake::see_off(const Robot& robot) {
@@ -203,10 +226,10 @@ bool Intake::see_off(const Robot& robot) {
 
 void Intake::hand_over(bool last) {
   while (last || !node_.lossless || queue_.has_room()) {
-    const bool far_behind = std::any_of(robots_.begin(), robots_.end(), [&](const auto& robot) {
-      return merger_.pending(robot.first) >= kMostBehind;
-    });
-    std::optional<Frame> frame = merger_.take(last || far_behind);
+    for (auto name = far_ahead_.begin(); name != far_ahead_.end();) {
+      name = merger_.pending(*name) < kMostBehind ? far_ahead_.erase(name) : std::next(name);
+    }
+    std::optional<Frame> frame = merger_.take(last || !far_ahead_.empty());
     if (!frame) return;
     if (node_.lossless || last) {
       queue_.push(std::move(*frame));
@@ -220,6 +243,7 @@ void Intake::update_status() {
   IntakeStatus status;
   status.cpu_ms = thread_cpu_ms();
   status.take_cpu_ms = departed_take_cpu_ms_;
+  status.visits = visits_;
   status.departed_frames = departed_frames_;
   status.departed_dropped = departed_dropped_;
   for (const auto& [name, robot] : robots_) {

@@ -73,6 +73,8 @@ class RobotInput {
   /// How long no depth image has come although there is a source [s]; 0 without one.
   double silent_s() const;
 
+  /// Images are waiting, for other streams or for poses.
+  bool waits() const { return streams_.synchronizer().pending() > 0; }
   StampNs watermark_ns() const { return streams_.synchronizer().watermark_ns(); }
   /// Depth images that came, good or bad.
   std::uint64_t images() const { return images_; }

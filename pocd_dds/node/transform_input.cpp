@@ -19,7 +19,7 @@ TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
 }
 
 std::set<std::string> TransformInput::drain(TransformTree& tree, ProblemCounter& problems) {
-  drain(static_, true, tree, problems);
+  drain_static(tree, problems);
   return drain(moving_, false, tree, problems);
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "embedded_idl.hpp"
 #include "pocd/recording/cdr.hpp"
 
 namespace pocd::dds {
@@ -103,17 +102,6 @@ std::vector<std::string> read_partitions(std::string text) {
 }
 
 }  // namespace
-
-const recording::IdlLibrary& known_types() {
-  static const recording::IdlLibrary library(embedded_idl());
-  return library;
-}
-
-std::string plain_type(const std::string& dds_type) {
-  const std::size_t at = dds_type.find("::dds_::");
-  if (at == std::string::npos || dds_type.back() != '_') return dds_type;
-  return dds_type.substr(0, at + 2) + dds_type.substr(at + 8, dds_type.size() - at - 9);
-}
 
 KeyOf key_of(const std::string& dds_type) {
   const std::string plain = plain_type(dds_type);

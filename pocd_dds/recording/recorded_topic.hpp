@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pocd/recording/idl_schema.hpp"
 #include "pocd/recording/recording_reader.hpp"
+#include "pocd_dds/entities/known_types.hpp"
 #include "pocd_dds/recording/raw_type.hpp"
 
 namespace pocd::dds {
@@ -23,10 +23,6 @@ struct RecordedTopic {
   std::vector<std::string> partitions;
 };
 
-/// The types whose IDL is part of this program.
-const recording::IdlLibrary& known_types();
-/// "nav_msgs::msg::dds_::Odometry_" -> "nav_msgs::msg::Odometry"; other names stay.
-std::string plain_type(const std::string& dds_type);
 /// How to tell the instances of a type; empty when its IDL is not known.
 KeyOf key_of(const std::string& dds_type);
 

@@ -47,6 +47,7 @@ class SitePublisher {
  private:
   using Clock = std::chrono::steady_clock;
   void work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots);
+  void tell(const std::atomic<bool>& stopping);
   void draw(const std::atomic<bool>& stopping);
   void write_objects(const DriveLoad& load, int robots, double seconds, StampNs stamp_ns);
   void change_map(const DriveLoad& load, int robots);
@@ -56,7 +57,7 @@ class SitePublisher {
   const NodeFile config_;
   std::shared_ptr<dds::Participant> participant_;
   dds::Wakeup wakeup_;
-  std::mutex mutex_;  // what both threads use
+  dds::Wakeup tellers_wakeup_;
   dds::ObjectPublication objects_;
   dds::MapPublication map_;
   dds::StatusPublication status_;

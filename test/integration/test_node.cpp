@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "robot_sender.hpp"
 
@@ -276,6 +277,33 @@ TEST(Node, IsHeardWhileItEmptiesItsQueue) {
   // One may have been on its way when the signal came.
   ASSERT_GE(heard.size(), before + 3) << "only its last word";
   EXPECT_EQ(heard[before + 1].message(), "running");
+}
+
+TEST(Commands, SayAsMuchAsIsWantedAndAsJsonLines) {
+  const TestDomain domain;
+  const auto said = [&](const std::vector<std::string>& more) {
+    auto command = std::vector<std::string>{bin("pocd_mirror"), "--timeout", "0.5", "--domain",
+                                            domain.text()};
+    command.insert(command.end(), more.begin(), more.end());
+    return run_command(command).err;
+  };
+  EXPECT_NE(said({}).find("pocd_mirror: info: stale, because no publisher"), std::string::npos);
+  const std::string little = said({"--log-level", "error"});
+  EXPECT_EQ(little.find("info"), std::string::npos) << little;
+  EXPECT_NE(little.find("pocd_mirror: error: gave up after 0.5 s"), std::string::npos) << little;
+  EXPECT_EQ(said({"--log-level", "off"}), "");
+  std::istringstream lines(said({"--log-json"}));
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    EXPECT_EQ(line.rfind("{\"time\":\"2", 0), 0u) << line;
+    EXPECT_NE(line.find("Z\",\"level\":\""), std::string::npos) << line;
+    EXPECT_NE(line.find("\"program\":\"pocd_mirror\",\"message\":\""), std::string::npos) << line;
+    EXPECT_EQ(line.substr(line.size() - 2), "\"}") << line;
+  }
+  EXPECT_GE(count, 2);
+  const CommandResult wrong = run_command({bin("pocd_mirror"), "--log-level", "loud"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("--log-level"), std::string::npos) << wrong.err;
 }
 
 TEST(Node, OperatorsProfileReplacesTheTable) {

@@ -22,6 +22,7 @@ struct RosOutputConfig {
   double occupancy_high_m = 2.0;
   int surface_points = 2'000'000;
   double obstacle_lifetime_s = 3.0;
+  double rate_mb_s = 10.0;
   std::string topic_namespace = "pocd";
   std::string level_name = "L1";
 
@@ -42,6 +43,9 @@ struct RosOutputConfig {
           "Most points of rt/pocd/surface; a larger surface is thinned.");
     visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
           "How long an obstacle that is not sent again stays with the fleet manager [s].");
+    visit("rate_mb_s", rate_mb_s, Range{0.01, 1000.0},
+          "Most that grid and surface take of the network in the mean, all subscribers together; "
+          "beyond it they come less often [MB/s].");
     visit("namespace", topic_namespace,
           "Takes the place of pocd in the names of these topics, but for rt/rmf_obstacles and "
           "rt/diagnostics, which several nodes may share.");
@@ -62,6 +66,8 @@ struct NodeConfig : InputConfig {
   bool use_clock = false;
   RosOutputConfig outputs;
   double shutdown_wait_s = 10.0;
+  double health_window_s = 10.0;
+  double stall_s = 10.0;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -87,6 +93,11 @@ struct NodeConfig : InputConfig {
     visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
     visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
           "How long to wait at the end for subscribers to acknowledge [s].");
+    visit("health_window_s", health_window_s, Range{0.1, 3600.0},
+          "How long something that went wrong counts for the level of pocd/health [s].");
+    visit("stall_s", stall_s, Range{0.1, 3600.0},
+          "A thread of the node that has not ended a turn for so long hangs: level 2, and not "
+          "ready [s].");
   }
 };
 
