@@ -18,7 +18,7 @@ packages=(
   # simulator: rays on meshes
   libembree-dev
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev iproute2 iptables
+  libgtest-dev libbenchmark-dev iproute2 iptables openssl
   cyclonedds-dev cyclonedds-tools tshark
 )
 
