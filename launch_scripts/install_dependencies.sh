@@ -20,7 +20,7 @@ packages=(
   # live page
   nlohmann-json3-dev libjs-three
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev iproute2 iptables
+  libgtest-dev libbenchmark-dev iproute2 iptables openssl
   cyclonedds-dev cyclonedds-tools tshark
 )
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/object_watch.hpp"
 #include "robot_sender.hpp"
 #include "whole_run.hpp"
 
@@ -40,19 +41,37 @@ std::string refusal(const Make& make) {
   return "";
 }
 
-TEST(Security, AuthorisedRolesMakeTheSameMap) {
-  const Authority authority({"component", "subscriber", "robot:robot1"});
+/// One to play, one to follow the map.
+struct Roles {
+  std::string player, follower;
+};
+class SecureRun : public ::testing::TestWithParam<Roles> {};
+
+TEST_P(SecureRun, MakesTheSameMap) {
+  const Authority authority({"component", "subscriber", "operator", "robot:robot1"});
   const TemporaryFolder folder;
   const std::vector<std::string> frames{"--max-frames", "30"};
   const RunSummary expected = offline_run(scenario(), folder.path() / "offline", frames);
   const TestDomain domain;
   Process node(fleet_command(domain, {"--lossless", "--security", authority.of("component")}));
   auto play = play_command(domain, frames);
-  play.insert(play.end(), {"--security", authority.of("robot1")});
-  const std::string said =
-      play_and_compare(domain, node, play, expected, {"--security", authority.of("subscriber")});
+  play.insert(play.end(), {"--security", authority.of(GetParam().player)});
+  std::atomic<std::uint64_t> objects{0};
+  ObjectWatchOptions watched;
+  watched.domain = domain.number();
+  watched.security_folder = authority.of(GetParam().follower);
+  watched.on_object = [&](const WatchedObject&) { ++objects; };
+  const ObjectWatch watch(watched);
+  const std::string said = play_and_compare(domain, node, play, expected,
+                                            {"--security", authority.of(GetParam().follower)});
   EXPECT_NE(said.find("30 frames processed"), std::string::npos) << said;
+  EXPECT_TRUE(eventually([&] { return objects > 0; })) << "a watch with the follower's role";
 }
+
+INSTANTIATE_TEST_SUITE_P(Security, SecureRun,
+                         ::testing::Values(Roles{"robot1", "subscriber"},
+                                           Roles{"operator", "operator"}),
+                         [](const auto& info) { return info.param.player; });
 
 TEST(Security, WithoutAnIdentityOfThisAuthorityNobodyReadsOrWrites) {
   const Authority authority({"component", "subscriber", "robot:robot1"});
@@ -62,10 +81,17 @@ TEST(Security, WithoutAnIdentityOfThisAuthorityNobodyReadsOrWrites) {
   const auto strangers = secured(domain, foreign.of("robot1"));
   const auto foreign_bus = secured(domain, foreign.of("subscriber"));
   HealthWatch plain_health(plain), foreign_health(foreign_bus);
+  using Objects = dds::Writer<pocd_msgs::msg::ObjectStatePubSubType>;
+  const Objects plain_objects(plain, dds::topics::kObjects);
+  const Objects foreign_objects(secured(domain, foreign.of("component")), dds::topics::kObjects);
   RobotSender plain_robot(plain, "robot1"), foreign_robot(strangers, "robot1");
   Process node(fleet_command(domain, {"--lossless", "--security", authority.of("component"),
                                       "--set", "node.segmentation=absent"}));
-  HealthWatch health(secured(domain, authority.of("subscriber")));
+  const auto subscriber = secured(domain, authority.of("subscriber"));
+  HealthWatch health(subscriber);
+  dds::Wakeup wakeup;
+  const dds::Reader<pocd_msgs::msg::ObjectStatePubSubType> objects(subscriber,
+                                                                   dds::topics::kObjects, wakeup);
   RobotSender robot(secured(domain, authority.of("robot1")), "robot1");
   ASSERT_TRUE(eventually([&] { return health.newest() && robot.matched(); })) << node.err();
   StampNs stamp_ns = 0;
@@ -78,6 +104,7 @@ TEST(Security, WithoutAnIdentityOfThisAuthorityNobodyReadsOrWrites) {
   EXPECT_EQ(plain_health.newest(), nullptr);
   EXPECT_EQ(foreign_health.newest(), nullptr);
   EXPECT_FALSE(plain_robot.depth.matched() > 0 || foreign_robot.depth.matched() > 0);
+  EXPECT_EQ(objects.matched(), 1) << "a subscriber takes objects from the component only";
   EXPECT_TRUE(health.newest()->problems().empty()) << health.newest()->problems()[0].reason();
   const CommandResult asked =
       run_command({bin("pocd_health"), "--domain", domain.text(), "--timeout", "2"});
@@ -126,6 +153,15 @@ TEST(Security, WhatIsMissingIsNamed) {
   EXPECT_NE(ended.exit_code, 0);
   EXPECT_NE(ended.err.find("component/permissions.p7s: no such file (security)"), std::string::npos)
       << ended.err;
+  // A certificate of another authority than the one that the folder names.
+  const Authority foreign({"component"});
+  std::filesystem::copy_file(foreign.of("component") + "/permissions.p7s",
+                             authority.of("component") + "/permissions.p7s");
+  std::filesystem::copy_file(foreign.of("component") + "/cert.pem",
+                             authority.of("component") + "/cert.pem",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_NE(run_command(node_command(domain, {"--security", authority.of("component")})).exit_code,
+            0);
   const CommandResult role =
       run_command({source("launch_scripts/security/make_ca.sh"), authority.of("other"), "admiral"});
   EXPECT_EQ(role.exit_code, 2);
