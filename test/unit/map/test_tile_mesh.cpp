@@ -121,8 +121,9 @@ TEST(TileMesh, NormalsPointOutOfASphere) {
   for (const auto& [key, tile] : tiles) {
     for (const TileVertex& vertex : extract_tile_mesh(key, std::cref(decoded)).vertices) {
       const Eigen::Vector3f p = voxel * (vertex.position_voxels +
-                                         Eigen::Vector3f(16.0f * key.x + 0.5f, 16.0f * key.y + 0.5f,
-                                                         16.0f * key.z + 0.5f));
+                                         Eigen::Vector3f(16.0f * static_cast<float>(key.x) + 0.5f,
+                                                         16.0f * static_cast<float>(key.y) + 0.5f,
+                                                         16.0f * static_cast<float>(key.z) + 0.5f));
       if (p.x() < 0.6f) continue;  // of the right sphere only
       // Distances have steps of truncation / 127, a tenth of a voxel here: 0.05 rad.
       EXPECT_GT(vertex.normal_W.dot((p - Eigen::Vector3f(0.4f, 0.1f, 0)).normalized()), 0.97f);
