@@ -123,7 +123,7 @@ TEST(Intake, ASampleCostsALookAtItsRobotOnly) {
   // Its status is of the last look at everybody; as long as nothing comes these are all there are.
   const auto started = std::chrono::steady_clock::now();
   const std::uint64_t before = looks();
-  for (int i = 1; i <= kSamples; ++i) {
+  for (StampNs i = 1; i <= kSamples; ++i) {
     robots[0]->send_odometry({"map", "base", i * 10'000'000, {}});
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
