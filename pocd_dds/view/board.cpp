@@ -50,8 +50,10 @@ void Board::put_surfaces(const Surfaces& surfaces) {
 std::vector<Piece> Board::next(Reading& reading, const std::vector<ChunkKey>& wanted,
                                std::size_t bytes, bool& reset) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  reset = reading.notices != 0 && reading.notices < notices_.pruned();
+  reset = reading.notices != 0 && reading.notices < notices_.pruned() &&
+          reading.began < notices_.pruned();
   if (reset) reading = {};
+  if (reading.notices == 0) reading.began = notices_.pruned();
   std::vector<Piece> pieces;
   std::size_t taken = 0;
   while (taken < bytes) {

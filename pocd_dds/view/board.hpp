@@ -24,6 +24,7 @@ struct Notice {
 /// How far one client has read. Its memory does not grow with what it misses.
 struct Reading {
   std::uint64_t notices = 0, chunks = 0;
+  std::uint64_t began = 0;  ///< what was forgotten up to here it cannot have heard of
   std::map<ChunkKey, std::uint64_t> tiles;  ///< of the chunks that it wants finely
 };
 

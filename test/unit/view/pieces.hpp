@@ -38,16 +38,21 @@ struct ReadPiece {
 
 /// The pieces of a message, as one deflate stream that has to end.
 inline std::vector<ReadPiece> read_message(const std::string& message) {
-  std::string plain(1 << 24, '\0');
+  std::string plain;
   z_stream stream{};
   inflateInit2(&stream, -15);
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(message.data() + 4));
   stream.avail_in = static_cast<uInt>(message.size() - 4);
-  stream.next_out = reinterpret_cast<Bytef*>(plain.data());
-  stream.avail_out = static_cast<uInt>(plain.size());
-  EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
+  std::vector<Bytef> part(1 << 16);
+  int result = Z_OK;
+  while (result == Z_OK) {
+    stream.next_out = part.data();
+    stream.avail_out = static_cast<uInt>(part.size());
+    result = inflate(&stream, Z_NO_FLUSH);
+    plain.append(part.begin(), part.end() - stream.avail_out);
+  }
+  EXPECT_EQ(result, Z_STREAM_END);
   EXPECT_EQ(stream.avail_in, 0u);
-  plain.resize(plain.size() - stream.avail_out);
   inflateEnd(&stream);
   std::vector<ReadPiece> pieces;
   for (std::size_t at = 0; at < plain.size();) {
