@@ -24,8 +24,16 @@ function decoderOf(channel) {
   return (data) => reader.readMessage(data);
 }
 
+/** The client knows the older name of the protocol only; what the server has chosen is in `chosen`. */
+class Socket extends WebSocket {
+  get chosen() { return super.protocol; }
+  get protocol() { return FoxgloveClient.SUPPORTED_SUBPROTOCOL; }
+}
+
 async function connect(address, subprotocol) {
-  const client = new FoxgloveClient({ ws: new WebSocket(address.replace("http", "ws"), [subprotocol]) });
+  const socket = new Socket(address.replace("http", "ws"), [subprotocol]);
+  const client = new FoxgloveClient({ ws: socket });
+  client.on("open", () => check(socket.chosen === subprotocol, `the server speaks ${subprotocol}`));
   const seen = { channels: [], messages: new Map(), statuses: [], parameters: null, info: null, time: null };
   const decoders = new Map();
   client.on("serverInfo", (info) => { seen.info = info; });

@@ -80,12 +80,13 @@ main(async () => {
   // A click on a box in the picture selects it.
   await page.keyboard.press("Escape");
   await page.keyboard.press("t");
-  await new Promise((resolve) => setTimeout(resolve, 1200));
+  await page.keyboard.press("Home");
+  await holds("the camera has arrived", () => window.pocd.stage.top && !window.pocd.stage.flight);
   const target = await page.evaluate(() => {
-    const object = [...window.pocd.store.objects.values()][0];
     const rect = document.querySelector("#canvas").getBoundingClientRect();
-    const p = window.pocd.stage.project([object.box[0], object.box[1], object.box[2] + object.box[6] / 2]);
-    return { id: object.id, x: rect.left + p.x, y: rect.top + p.y };
+    const places = [...window.pocd.store.objects.values()].map(({ id, box }) => ({ id, p: window.pocd.stage.project([box[0], box[1], box[2] + box[6] / 2]) }));
+    const { id, p } = places.find((place) => place.p?.inside);
+    return { id, x: rect.left + p.x, y: rect.top + p.y };
   });
   await page.mouse.click(target.x, target.y);
   await holds("a click on a box selects it", (id) => window.pocd.panel.selected === id, target.id);
