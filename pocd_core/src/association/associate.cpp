@@ -57,9 +57,6 @@ std::optional<Match> match_of(const IcpResult& icp, const Points& source, const 
   match.displacement_m = distance / static_cast<double>(source.size());
   // Positive when the observation is nearer to the camera than the object was.
   match.sign = moved_C.z() < 0.0 ? 1 : -1;
-  match.cost =
-      config.lambda_translation * match.displacement_m +
-      config.lambda_rotation * std::abs(Eigen::AngleAxisd(icp.T_target_source.linear()).angle());
   return match;
 }
 

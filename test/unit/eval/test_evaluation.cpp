@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "pocd/config/config_io.hpp"
+#include "pocd/eval/published_method.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
 
@@ -66,7 +67,8 @@ std::vector<MethodSpec> all_methods(const PipelineConfig& config) {
              return make_tracked_objects_method(config, keep);
            }},
           {"voxel_correction", [=] { return make_voxel_correction_method(config); }},
-          {"submaps", [=] { return make_submap_method(config); }}};
+          {"submaps", [=] { return make_submap_method(config); }},
+          {"published", [=] { return make_published_method(config); }}};
 }
 
 TEST(Evaluation, ARemovedStackIsForgottenByUsAndKeptByAStaticMap) {

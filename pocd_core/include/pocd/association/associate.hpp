@@ -19,7 +19,6 @@ struct Match {
   double displacement_m = 0.0;
   /// Positive when the observation is in front of the object seen from the camera, as published.
   int sign = 1;
-  double cost = 0.0;
 };
 
 /// How an object that is still about where it was may have moved: point-to-plane ICP from `start`
