@@ -12,6 +12,8 @@ packages=(
   # core
   libeigen3-dev libpcl-dev libopencv-dev libyaml-cpp-dev libspdlog-dev libcli11-dev libdlib-dev
   libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
+  # simulator: rays on meshes
+  libembree-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev iproute2 iptables
   cyclonedds-dev cyclonedds-tools tshark

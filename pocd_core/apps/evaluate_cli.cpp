@@ -55,6 +55,10 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
                  "Faults put into the frames: pose_jumps, mask_gaps, depth_holes")
       ->delimiter(',')
       ->check(CLI::IsMember(kFaults));
+  app.add_option("--sensor", o.sensor,
+                 "File of a sensor model for every simulated scenario, as "
+                 "config/sim/sensors/edges.yaml")
+      ->excludes(dataset);
   app.add_option(
          "--sim", o.sim,
          "Change of every simulated scenario, KEY=VALUE: frame_rate_hz, width, height, fx, "

@@ -21,6 +21,7 @@ struct EvaluateOptions {
   std::vector<std::filesystem::path> variant_files;
   std::vector<std::uint64_t> seeds = {1, 2, 3};
   std::vector<std::string> faults;
+  std::filesystem::path sensor;  ///< model for every simulated scenario; empty: its own
   std::vector<std::string> sim;
   std::vector<std::filesystem::path> config;
   std::vector<std::string> overrides;

@@ -143,6 +143,7 @@ std::vector<RunScore> RouteRunner::run(const std::vector<MethodSpec>& methods,
 
 Scenario RouteRunner::scenario_of(const Route& route) const {
   Scenario scenario = load_run(route.files);
+  if (!options_.sensor.empty()) scenario.sensor = load_sensor(options_.sensor);
   SimChanges changes{scenario.frame_rate_hz, scenario.camera, scenario.sensor};
   load_config(changes, {}, options_.sim, "--sim");
   scenario.frame_rate_hz = changes.frame_rate_hz;

@@ -25,6 +25,7 @@ struct RunnerOptions {
   std::string dataset;  ///< of recordings; empty: the simulator
   std::vector<std::uint64_t> seeds = {1};
   std::vector<std::string> faults;
+  std::filesystem::path sensor;  ///< file of a sensor model for every scenario; empty: its own
   std::vector<std::string> sim;  ///< changes of every scenario, KEY=VALUE
   PipelineConfig config;         ///< for depth limit, map voxels, classes
   VoxelMetricsConfig voxels;

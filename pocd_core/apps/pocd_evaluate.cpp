@@ -135,6 +135,7 @@ int main(int argc, char** argv) {
     run_options.dataset = options.dataset;
     run_options.seeds = options.seeds;
     run_options.faults = options.faults;
+    run_options.sensor = options.sensor;
     run_options.sim = options.sim;
     run_options.jobs = options.jobs;
     run_options.with_reference = options.with_reference;

@@ -5,8 +5,10 @@
 #include <limits>
 #include <memory>
 
+#include "pocd/common/check.hpp"
 #include "pocd/sim/render.hpp"
 #include "pocd/sim/sim_reader.hpp"
+#include "pocd/sim/triangle_mesh.hpp"
 
 namespace pocd {
 namespace {
@@ -18,7 +20,8 @@ constexpr double kClearDepth = 1.0;  // between a sample and a measured depth
 constexpr double kSeenMargin = 2.0;
 
 struct Sample {
-  Eigen::Vector3d point_W, normal_W;
+  Eigen::Vector3d point_W;
+  Eigen::Vector3d normal_W;  ///< zero: seen from anywhere
   std::optional<std::size_t> first_seen;
 };
 
@@ -47,6 +50,41 @@ std::vector<Sample> sample_box(const OrientedBox& box, double spacing_m) {
   return samples;
 }
 
+/// The surface of an object that has a mesh, else its box: a mesh may fill little of its box.
+std::vector<Sample> sample_object(const SceneObject& object, const OrientedBox& box,
+                                  double spacing_m) {
+  std::vector<Sample> samples;
+  bool has_mesh = false;
+  for (const ScenePart& part : object.parts) {
+    const Pose T_W_P = object.T_W_O * part.T_O_P;
+    if (part.shape == Shape::kMesh) {
+      has_mesh = true;
+      const auto count = static_cast<std::size_t>(
+          std::ceil(part.mesh->area_m2() / (spacing_m * spacing_m)));
+      for (const Eigen::Vector3f& point : part.mesh->sample(count)) {
+        samples.push_back({T_W_P * point.cast<double>(), Eigen::Vector3d::Zero(), std::nullopt});
+      }
+    } else {
+      SceneObject alone;
+      alone.T_W_O = T_W_P;
+      alone.parts = {part};
+      alone.parts[0].T_O_P = Pose::Identity();
+      for (const Sample& sample : sample_box(bounding_box(alone), spacing_m)) {
+        samples.push_back(sample);
+      }
+    }
+  }
+  return has_mesh ? samples : sample_box(box, spacing_m);
+}
+
+/// As it stands at the end of a visit.
+const SceneObject& object_named(const Scene& scene, const std::string& name) {
+  const auto found = std::find_if(scene.objects.begin(), scene.objects.end(),
+                                  [&](const SceneObject& object) { return object.name == name; });
+  POCD_CHECK(found != scene.objects.end());
+  return *found;
+}
+
 enum class Look { kHit, kThrough };
 
 void look(const Frame& frame, std::size_t number, const SceneTruthOptions& options, Look what,
@@ -55,7 +93,9 @@ void look(const Frame& frame, std::size_t number, const SceneTruthOptions& optio
   const double clear_m = kClearDepth * options.map_voxel_m;
   for (Sample& sample : samples) {
     if (sample.first_seen) continue;
-    if ((frame.T_W_C.translation() - sample.point_W).dot(sample.normal_W) <= 0.0) continue;
+    if (!sample.normal_W.isZero() &&
+        (frame.T_W_C.translation() - sample.point_W).dot(sample.normal_W) <= 0.0)
+      continue;
     const Eigen::Vector3d p_C = T_C_W * sample.point_W;
     if (p_C.z() < 0.05 || p_C.z() > options.max_depth_m) continue;
     const double u = p_C.x() / p_C.z() * frame.camera.fx + frame.camera.cx + 0.5;
@@ -102,7 +142,8 @@ void carry_over(std::size_t next_visit, std::vector<SeenChange>& changes,
   }
 }
 
-double part_distance(const ScenePart& part, const Eigen::Vector3d& p_P) {
+double part_distance(const ScenePart& part, const Eigen::Vector3d& p_P, double limit_m) {
+  if (part.shape == Shape::kMesh) return part.mesh->distance_m(p_P, limit_m);
   const Eigen::Vector3d half = part.size_m / 2.0;
   if (part.shape == Shape::kBox) {
     const Eigen::Vector3d q = p_P.cwiseAbs() - half;
@@ -136,7 +177,7 @@ double surface_distance(const Scene& scene, const Eigen::Vector3d& point_W, doub
       const Eigen::Vector3d offset = point_W - T_W_P.translation();
       const double reach = best + part.size_m.norm() / 2.0;
       if (offset.squaredNorm() > reach * reach) continue;
-      best = std::min(best, std::abs(part_distance(part, T_W_P.linear().transpose() * offset)));
+      best = std::min(best, std::abs(part_distance(part, T_W_P.linear().transpose() * offset, best)));
     }
   }
   return best;
@@ -171,11 +212,18 @@ SceneTruth scene_truth(const Scenario& scenario, const SceneTruthOptions& option
   for (std::size_t visit = 0; visit <= last; ++visit) {
     truth.objects.push_back(objects_after(scenario, visit));
     if (visit == 0) continue;
+    constexpr double kEnd = std::numeric_limits<double>::infinity();
+    const Scene before = scene_at(scenario, visit - 1, kEnd);
+    const Scene after = scene_at(scenario, visit, kEnd);
+    const auto samples = [&](const Scene& scene, const std::string& name,
+                             const std::optional<OrientedBox>& box) {
+      return box ? sample_object(object_named(scene, name), *box, spacing_m)
+                 : std::vector<Sample>();
+    };
     for (const TruthChange& change : changes_of(scenario, visit)) {
       truth.changes.push_back({change, visit, std::nullopt, std::nullopt});
-      places.push_back(
-          {change.before ? sample_box(*change.before, spacing_m) : std::vector<Sample>(),
-           change.after ? sample_box(*change.after, spacing_m) : std::vector<Sample>()});
+      places.push_back({samples(before, change.name, change.before),
+                        samples(after, change.name, change.after)});
     }
   }
 

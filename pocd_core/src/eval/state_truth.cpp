@@ -1,5 +1,6 @@
 #include "pocd/eval/state_truth.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -15,6 +16,8 @@ constexpr ClassId kThingClass = 2;  // of the PCD reader
 constexpr double kSameCenter_m = 0.01;
 /// Depth within this of a point's own is the point's surface: three sigma of the camera at 1 m.
 constexpr double kSameDepth_m = 0.02;
+/// Share of a thing's points below which what is seen of it tells nothing.
+constexpr double kLeastSeen = 0.02;
 
 struct Instance {
   Points points_W;
@@ -41,10 +44,23 @@ std::map<int, Instance> instances_of(const Frame& frame) {
 
 /// What a frame says about the points of a thing.
 struct Sight {
-  double hidden = 0.0, seen_through = 0.0;  ///< shares of all points
+  double hidden = 0.0, seen_through = 0.0;  ///< shares of all points; outlines are seen through by nobody
   int hit_instance = 0;                     ///< the one most often hit
   double hit_share = 0.0;                   ///< share of points that hit it
 };
+
+/// Whether the surface at a pixel and at all its neighbours that were measured lies behind `depth_m`.
+/// A pixel at the outline of what hides the point, or of the point's own thing, sees now one side of
+/// the edge and now the other.
+bool all_behind(const Frame& frame, int v, int u, double depth_m) {
+  for (int y = std::max(0, v - 1); y <= std::min(frame.camera.height - 1, v + 1); ++y) {
+    for (int x = std::max(0, u - 1); x <= std::min(frame.camera.width - 1, u + 1); ++x) {
+      const float other_m = frame.depth_m.at<float>(y, x);
+      if (other_m > 0.0f && !(other_m > depth_m + kSameDepth_m)) return false;
+    }
+  }
+  return true;
+}
 
 Sight look_at(const Points& points_W, const Frame& frame) {
   const Pose T_C_W = frame.T_W_C.inverse();
@@ -61,7 +77,7 @@ Sight look_at(const Points& points_W, const Frame& frame) {
     if (depth < p_C.z() - kSameDepth_m) {
       ++hidden;
     } else if (depth > p_C.z() + kSameDepth_m) {
-      ++through;
+      through += all_behind(frame, v, u, p_C.z());
     } else {
       const int label = frame.labels.at<std::uint16_t>(v, u);
       if (label / kInstanceDivisor == kThingClass) ++hits[label % kInstanceDivisor];
@@ -114,8 +130,12 @@ void add_history(const ExpectedState& before, const Frame& frame, const std::vec
   for (const ExpectedObject* object : known) {
     const Sight sight = look_at(object->points_W, frame);
     const double visible = sight.hit_share + sight.seen_through;
-    // A thing that stayed shows no more of the background than its ragged outline does.
-    if (sight.seen_through > 0.15 || sight.seen_through > 0.3 * visible) continue;
+    // A thing that stayed shows no more of the background than the noise of its outline does; what is
+    // seen of a thing that is nearly hidden is outline only.
+    if (sight.seen_through > 0.15 ||
+        (sight.seen_through > kLeastSeen && sight.seen_through > 0.3 * visible)) {
+      continue;
+    }
     if (sight.hit_share > 0.2) {
       for (std::size_t i = 0; i < ids.size(); ++i) {
         if (ids[i] != sight.hit_instance) continue;

@@ -177,7 +177,7 @@ void BlockStore::bring_back(Region& region) {
 void BlockStore::lose(Region& region, const std::string& reason) {
   const std::size_t blocks = region.present.count();
   for (std::uint32_t place = 0; place < kRegionBlocks; ++place) {
-    if (region.present[place]) dirty_.push_back(region.block_at(place));
+    if (region.present[place]) list_dirty(region.block_at(place));
   }
   region.present.reset();
   size_ -= blocks;

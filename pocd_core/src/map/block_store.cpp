@@ -6,6 +6,14 @@
 #include "region.hpp"
 
 namespace pocd {
+namespace {
+
+/// For members that have the store to themselves: no other thread counts meanwhile.
+void count(std::atomic<std::uint64_t>& counter, std::uint64_t more) {
+  counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
+}
+
+}  // namespace
 
 BlockStore::BlockStore(const MapMemoryConfig& memory)
     : memory_(memory), file_(memory.limited() ? new PageFile(memory.folder) : nullptr) {}
@@ -17,7 +25,7 @@ const BlockStore::Region* BlockStore::region(const BlockKey& region_key) const {
 }
 
 BlockStore::Region* BlockStore::region(const BlockKey& region_key) {
-  ++visits_.regions;
+  count(visits_.regions, 1);
   if (last_region_ && last_region_->key == region_key) return last_region_;
   const auto it = regions_.find(region_key);
   if (it == regions_.end()) return nullptr;
@@ -52,7 +60,7 @@ void BlockStore::see(Region& region) {
 void BlockStore::enter(Region& region) {
   if (!region.memory) bring_back(region);
   see(region);
-  visits_.blocks += region.memory->members.size();
+  count(visits_.blocks, region.memory->members.size());
 }
 
 std::uint32_t BlockStore::find(const BlockKey& key) const {
@@ -69,7 +77,7 @@ std::uint32_t BlockStore::find_or_allocate(const BlockKey& key) {
   Region& r = find_or_make_region(key.region());
   if (!r.memory) bring_back(r);
   see(r);
-  ++visits_.blocks;
+  count(visits_.blocks, 1);
   const std::uint32_t known = r.memory->slot_of[Region::place(key)];
   if (known != kNoSlot) return known;
   const std::uint32_t slot = allocate(r, key);
@@ -182,8 +190,8 @@ std::vector<BlockKey> BlockStore::sorted_keys() const {
       if (region->present[place]) keys.push_back(region->block_at(place));
     }
   }
-  visits_.regions += regions_.size();
-  visits_.blocks += size_;
+  visits_.regions.fetch_add(regions_.size(), std::memory_order_relaxed);
+  visits_.blocks.fetch_add(size_, std::memory_order_relaxed);
   std::sort(keys.begin(), keys.end());
   return keys;
 }
@@ -245,7 +253,7 @@ std::vector<std::uint32_t> BlockStore::take_owner(std::uint32_t owner) {
     owners.erase(std::find(owners.begin(), owners.end(), owner));
   }
   owner_entries_ -= slots.size();
-  visits_.blocks += slots.size();
+  count(visits_.blocks, slots.size());
   std::sort(slots.begin(), slots.end(),
             [this](std::uint32_t a, std::uint32_t b) { return block(a).key < block(b).key; });
   return slots;
@@ -255,12 +263,24 @@ void BlockStore::mark_dirty(std::uint32_t slot) {
   Meta& m = meta(slot);
   if (m.dirty_list == dirty_list_) return;
   m.dirty_list = dirty_list_;
-  dirty_.push_back(block(slot).key);
+  list_dirty(block(slot).key);
+}
+
+// A place whose block comes and goes is listed each time: without sorting out, the list would grow
+// for as long as nobody takes it. Sorting when it has doubled costs little per entry.
+void BlockStore::list_dirty(const BlockKey& key) {
+  constexpr std::size_t kLeast = 4096;
+  dirty_.push_back(key);
+  if (dirty_.size() < std::max(kLeast, 2 * dirty_sorted_)) return;
+  std::sort(dirty_.begin(), dirty_.end());
+  dirty_.erase(std::unique(dirty_.begin(), dirty_.end()), dirty_.end());
+  dirty_sorted_ = dirty_.size();
 }
 
 std::vector<BlockKey> BlockStore::take_dirty() {
   std::vector<BlockKey> keys = std::move(dirty_);
   dirty_.clear();
+  dirty_sorted_ = 0;
   ++dirty_list_;  // no block is in the new list, in memory or on disk
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <bitset>
 #include <cstdint>
 #include <memory>
@@ -79,7 +80,8 @@ class BlockStore {
   /// Brings those on disk back.
   std::vector<std::uint32_t> take_owner(std::uint32_t owner);
 
-  /// Dirty blocks are listed once. drop() lists a block that was ever dirty.
+  /// Dirty blocks are listed once. drop() lists a block that was ever dirty. The list is at most
+  /// twice as long as there are places in it, and a little.
   void mark_dirty(std::uint32_t slot);
   /// Canonical order; clears the list.
   std::vector<BlockKey> take_dirty();
@@ -91,7 +93,7 @@ class BlockStore {
   MapMemoryStatus memory_status() const;
   /// What went wrong first since the last call, one line.
   std::optional<std::string> take_problem();
-  const MapVisits& visits() const { return visits_; }
+  MapVisits visits() const { return {visits_.regions.load(), visits_.blocks.load()}; }
 
  private:
   static constexpr int kChunkShift = 3;
@@ -126,6 +128,7 @@ class BlockStore {
   void add_chunk(Region& region);
   void release_memory(Region& region);
   void forget_owners(std::uint32_t slot);
+  void list_dirty(const BlockKey& key);
   void erase(Region& region);
 
   // block_eviction.cpp
@@ -151,6 +154,7 @@ class BlockStore {
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> owner_slots_;
   std::unordered_map<std::uint32_t, std::vector<BlockKey>> owner_regions_on_disk_;
   std::vector<BlockKey> dirty_;
+  std::size_t dirty_sorted_ = 0;  ///< length of dirty_ when it was sorted out last
   std::uint32_t dirty_list_ = 1;
 
   std::size_t size_ = 0, size_on_disk_ = 0;
@@ -158,7 +162,11 @@ class BlockStore {
   std::uint64_t over_budget_pass_ = 0, failed_pass_ = 0;  // the last such pass
   MapMemoryStatus counts_;
   std::optional<std::string> problem_;
-  mutable MapVisits visits_;
+  /// Counted by const members too, which may run beside each other.
+  struct Visits {
+    std::atomic<std::uint64_t> regions{0}, blocks{0};
+  };
+  mutable Visits visits_;
 };
 
 }  // namespace pocd

@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <cmath>
 #include <cstdio>
 #include <set>
 #include <string>
@@ -39,10 +40,12 @@ class StageClock {
   double wall_, cpu_;
 };
 
-std::string behind_text(const Frame& frame, StampNs newest_ns) {
-  char text[64];
-  std::snprintf(text, sizeof(text), "stamp is %.1f s behind the newest",
-                static_cast<double>(newest_ns - frame.stamp_ns) * 1e-9);
+std::string off_text(const Frame& frame, StampNs newest_ns) {
+  const double ahead_s =
+      (static_cast<double>(frame.stamp_ns) - static_cast<double>(newest_ns)) * 1e-9;
+  char text[80];
+  std::snprintf(text, sizeof(text), "stamp is %.1f s %s the newest", std::abs(ahead_s),
+                ahead_s > 0.0 ? "ahead of" : "behind");
   return (frame.robot.empty() ? "" : frame.robot + ": ") + text;
 }
 
@@ -94,13 +97,13 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   p.check(frame);
   FrameResult result;
   const StampNs newest_ns = p.frame_clock.newest_ns();
-  const FrameClock::Verdict verdict = p.frame_clock.judge(frame.stamp_ns);
+  const FrameClock::Verdict verdict = p.frame_clock.judge(frame.robot, frame.stamp_ns);
   if (verdict != FrameClock::Verdict::kGoesOn) {
-    const bool behind = verdict == FrameClock::Verdict::kBehind;
-    result.warnings.push_back(behind_text(frame, newest_ns) +
-                              (behind ? ": frame not used" : ": clocks were set back, goes on"));
-    result.accepted = !behind;
-    if (behind) return result;
+    result.accepted = verdict == FrameClock::Verdict::kSetBack;
+    result.warnings.push_back(
+        off_text(frame, newest_ns) +
+        (result.accepted ? ": clocks were set back, goes on" : ": frame not used"));
+    if (!result.accepted) return result;
     p.tracker.set_clock_back(frame.stamp_ns);
   }
   if (const auto reason = p.pose_gate.refuse(frame)) {

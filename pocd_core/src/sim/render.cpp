@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "pocd/common/kernel.hpp"
+#include "pocd/sim/triangle_mesh.hpp"
 #include "shade.hpp"
 
 namespace pocd {
@@ -21,6 +22,7 @@ struct ViewPart {
   float origin[3];
   float dir0[3], dir_u[3], dir_v[3];  // direction_P(u, v) = dir0 + u dir_u + v dir_v
   int u0, u1, v0, v1;                 // pixels in [u0, u1) x [v0, v1)
+  const TriangleMesh* mesh;           // of kMesh
 };
 
 /// Bounds the projection of the part's box, cut at the near plane. False when nothing is in front.
@@ -103,6 +105,19 @@ POCD_KERNEL void cast_cylinder_row(const ViewPart& part, int v, float* depth_m,
   }
 }
 
+void cast_mesh_row(const ViewPart& part, int v, float* depth_m, std::int32_t* part_id) {
+  const Eigen::Vector3f origin(part.origin), du(part.dir_u);
+  const Eigen::Vector3f begin =
+      Eigen::Vector3f(part.dir0) + static_cast<float>(v) * Eigen::Vector3f(part.dir_v);
+  for (int u = part.u0; u < part.u1; ++u) {
+    const float t =
+        part.mesh->cast(origin, begin + static_cast<float>(u) * du, kNear_m, depth_m[u]);
+    if (!(t < depth_m[u])) continue;
+    depth_m[u] = t;
+    part_id[u] = part.part;
+  }
+}
+
 std::vector<ViewPart> prepare(const Scene& scene, const CameraModel& camera, const Pose& T_W_C,
                               std::vector<int>& object_of_part) {
   std::vector<ViewPart> parts;
@@ -111,6 +126,7 @@ std::vector<ViewPart> prepare(const Scene& scene, const CameraModel& camera, con
     for (const ScenePart& part : scene.objects[i].parts) {
       ViewPart view{};
       view.shape = part.shape;
+      view.mesh = part.mesh.get();
       view.object = static_cast<int>(i);
       view.part = running++;
       object_of_part.push_back(view.object);
@@ -162,6 +178,9 @@ RenderedFrame render(const Scene& scene, const CameraModel& camera, const Pose& 
             break;
           case Shape::kCylinder:
             cast_cylinder_row(part, v, depth_m, part_id);
+            break;
+          case Shape::kMesh:
+            cast_mesh_row(part, v, depth_m, part_id);
             break;
         }
       }

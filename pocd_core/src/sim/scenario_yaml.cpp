@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "object_yaml.hpp"
 #include "pocd/common/check.hpp"
+#include "sensor_yaml.hpp"
 #include "yaml_fields.hpp"
 
 namespace pocd {
@@ -12,79 +14,6 @@ namespace {
 
 constexpr double kDegree = M_PI / 180.0;
 constexpr int kMaxBaseDepth = 8;
-
-Shape to_shape(YamlFields& fields) {
-  const std::string word = fields.text("shape", "box");
-  if (word == "box") return Shape::kBox;
-  if (word == "cylinder") return Shape::kCylinder;
-  fields.fail("shape", "must be box or cylinder, is '" + word + "'");
-}
-
-Texture to_texture(YamlFields& fields) {
-  const std::string word = fields.text("texture", "plain");
-  if (word == "plain") return Texture::kPlain;
-  if (word == "cardboard") return Texture::kCardboard;
-  if (word == "tarp") return Texture::kTarp;
-  if (word == "concrete") return Texture::kConcrete;
-  if (word == "wood") return Texture::kWood;
-  fields.fail("texture", "must be plain, cardboard, tarp, concrete or wood, is '" + word + "'");
-}
-
-/// Shape, size and looks; the base of the part at `base` in the object's frame.
-ScenePart to_part(YamlFields& fields, const Eigen::Vector3d& base, double yaw_rad) {
-  ScenePart part;
-  part.shape = to_shape(fields);
-  part.size_m = fields.numbers("size", 3);
-  if (fields.has("rgb")) part.rgb = fields.numbers("rgb", 3);
-  part.texture = to_texture(fields);
-  part.T_O_P = upright_pose(base + Eigen::Vector3d(0, 0, 0.5 * part.size_m.z()), yaw_rad);
-  return part;
-}
-
-SceneObject to_object(const YAML::Node& node, const std::string& where, const YAML::Node& kinds) {
-  YamlFields probe(node, where);
-  const std::string name = probe.text("name");
-  const std::string place = where + " '" + name + "'";
-  YAML::Node kind;
-  if (probe.has("kind")) {
-    const std::string word = probe.text("kind");
-    if (!kinds.IsMap() || !kinds[word].IsDefined())
-      probe.fail("kind", "is unknown: '" + word + "'");
-    kind.reset(kinds[word]);
-  }
-  YamlFields fields(node, place, kind);
-  SceneObject object;
-  object.name = fields.text("name");
-  if (fields.has("kind")) fields.text("kind");
-  const int class_id = fields.integer("class");
-  if (class_id < 0 || class_id > 65535) fields.fail("class", "must be in [0, 65535]");
-  object.class_id = static_cast<ClassId>(class_id);
-  object.stationarity_class = fields.integer("stationarity", 0);
-  if (fields.has("parts")) {
-    const YAML::Node parts = fields.node("parts");
-    if (!parts.IsSequence()) fields.fail("parts", "must be a list");
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      YamlFields part(parts[i], place + ": parts[" + std::to_string(i) + "]");
-      const Eigen::Vector3d at = part.has("at") ? part.numbers("at", 3) : Eigen::VectorXd::Zero(3);
-      const double yaw_rad = kDegree * part.number("yaw_deg", 0.0);
-      object.parts.push_back(to_part(part, at, yaw_rad));
-      part.finish();
-    }
-  } else {
-    object.parts.push_back(to_part(fields, Eigen::Vector3d::Zero(), 0.0));
-  }
-  const Eigen::Vector3d at = fields.has("at") ? fields.numbers("at", 3) : Eigen::VectorXd::Zero(3);
-  const double lean_rad = kDegree * fields.number("lean_deg", 0.0);
-  object.T_W_O = upright_pose({at.x(), at.y(), fields.number("z", 0.0)}, kDegree * at.z());
-  if (lean_rad != 0.0) {
-    // Tilted about its own x axis and lifted, so that it stands on its lower edge.
-    const double lift = 0.5 * object.parts.front().size_m.y() * std::abs(std::sin(lean_rad));
-    object.T_W_O = object.T_W_O * Eigen::Translation3d(0, 0, lift) *
-                   Eigen::AngleAxisd(lean_rad, Eigen::Vector3d::UnitX());
-  }
-  fields.finish();
-  return object;
-}
 
 SceneObject& find(std::vector<SceneObject>& objects, const std::string& name,
                   const std::string& where) {
@@ -140,7 +69,7 @@ void apply_move(YamlFields& fields, std::vector<SceneObject>& objects) {
 }
 
 void apply_change(const YAML::Node& node, const std::string& where, const YAML::Node& kinds,
-                  std::vector<SceneObject>& objects) {
+                  MeshFiles& files, std::vector<SceneObject>& objects) {
   YamlFields fields(node, where);
   if (fields.has("move")) {
     apply_move(fields, objects);
@@ -150,11 +79,11 @@ void apply_change(const YAML::Node& node, const std::string& where, const YAML::
       objects.erase(objects.begin() + (gone - objects.data()));
     }
   } else if (fields.has("add")) {
-    objects.push_back(to_object(fields.node("add"), where + ": add", kinds));
+    objects.push_back(to_object(fields.node("add"), where + ": add", kinds, files));
   } else if (fields.has("drive")) {
     find(objects, fields.text("drive"), where).track = to_track(fields);
   } else if (fields.has("pass")) {
-    SceneObject object = to_object(fields.node("pass"), where + ": pass", kinds);
+    SceneObject object = to_object(fields.node("pass"), where + ": pass", kinds, files);
     object.track = to_track(fields);
     object.transient = true;
     objects.push_back(object);
@@ -164,12 +93,14 @@ void apply_change(const YAML::Node& node, const std::string& where, const YAML::
   fields.finish();
 }
 
-void apply_changes(YamlFields& fields, const YAML::Node& kinds, std::vector<SceneObject>& objects) {
+void apply_changes(YamlFields& fields, const YAML::Node& kinds, MeshFiles& files,
+                   std::vector<SceneObject>& objects) {
   if (!fields.has("changes")) return;
   const YAML::Node list = fields.node("changes");
   if (!list.IsSequence()) fields.fail("changes", "must be a list");
   for (std::size_t i = 0; i < list.size(); ++i) {
-    apply_change(list[i], fields.where() + ": changes[" + std::to_string(i) + "]", kinds, objects);
+    apply_change(list[i], fields.where() + ": changes[" + std::to_string(i) + "]", kinds, files,
+                 objects);
   }
 }
 
@@ -226,48 +157,21 @@ Pose to_mount(YamlFields& fields) {
   return T_B_C;
 }
 
-/// Visits SensorModel's fields and overwrites those that the map has.
-struct SensorFields {
-  YamlFields& fields;
-  void operator()(const char* key, double& value, Range range, const char*) {
-    value = fields.number(key, value);
-    if (value < range.low || value > range.high) out_of(key, range);
-  }
-  void operator()(const char* key, int& value, Range range, const char*) {
-    value = fields.integer(key, value);
-    if (value < range.low || value > range.high) out_of(key, range);
-  }
-  void operator()(const char* key, std::string& value, const char*) {
-    value = fields.text(key, value);
-  }
-  void out_of(const char* key, Range range) {
-    fields.fail(
-        key, "must be in [" + std::to_string(range.low) + ", " + std::to_string(range.high) + "]");
-  }
-};
-
-SensorModel to_sensor(const YAML::Node& node, const std::string& where) {
-  SensorModel model;
-  if (node.IsScalar()) {
-    if (node.Scalar() == "perfect") return SensorModel::perfect();
-    if (node.Scalar() == "stereo") return model;
-    throw InputError(where + " must be perfect, stereo or a map, is '" + node.Scalar() + "'");
-  }
-  YamlFields fields(node, where);
-  SensorFields visitor{fields};
-  model.describe(visitor);
-  fields.finish();
-  try {
-    model.blob_classes();
-  } catch (const InputError& error) {
-    throw InputError(where + ": " + error.what());
-  }
-  return model;
+SensorModel to_sensor(const YAML::Node& node, const MeshFiles& files, const std::string& where) {
+  if (!node.IsScalar()) return sensor_of(node, where);
+  const std::string word = node.Scalar();
+  if (word == "perfect") return SensorModel::perfect();
+  if (word == "stereo") return SensorModel();
+  const std::filesystem::path file = files.find(word);
+  if (!file.empty() && file.extension() == ".yaml") return load_sensor(file);
+  throw InputError(where + " must be perfect, stereo, a YAML file or a map, is '" + word + "'");
 }
 
+/// What a scenario hands on to those that it is the base of.
 struct Loaded {
   Scenario scenario;
   YAML::Node kinds;
+  MeshFiles files;
 };
 
 void read_area(YamlFields& area, Scenario& scenario) {
@@ -282,7 +186,8 @@ void read_area(YamlFields& area, Scenario& scenario) {
   area.finish();
 }
 
-void read_world(YamlFields& top, const std::string& where, Scenario& scenario) {
+void read_world(YamlFields& top, const std::string& where, const MeshFiles& files,
+                Scenario& scenario) {
   if (top.has("camera")) {
     YamlFields camera(top.node("camera"), where + ": camera");
     scenario.camera = {camera.integer("width"), camera.integer("height"), camera.number("fx"),
@@ -300,7 +205,9 @@ void read_world(YamlFields& top, const std::string& where, Scenario& scenario) {
     YamlFields area(top.node("area"), where + ": area");
     read_area(area, scenario);
   }
-  if (top.has("sensor")) scenario.sensor = to_sensor(top.node("sensor"), where + ": key 'sensor'");
+  if (top.has("sensor")) {
+    scenario.sensor = to_sensor(top.node("sensor"), files, where + ": key 'sensor'");
+  }
   if (top.has("robots")) {
     scenario.robots.clear();
     const YAML::Node robots = top.node("robots");
@@ -329,13 +236,14 @@ Loaded load(const std::filesystem::path& file, int depth) {
   Scenario& scenario = out.scenario;
   scenario.name = top.text("name");
   scenario.description = top.text("description", "");
-  read_world(top, where, scenario);
+  out.files.add_folder(file.parent_path());
+  read_world(top, where, out.files, scenario);
   if (top.has("kinds")) out.kinds.reset(top.node("kinds"));
   if (top.has("objects")) {
     const YAML::Node list = top.node("objects");
     for (std::size_t i = 0; i < list.size(); ++i) {
       objects.push_back(
-          to_object(list[i], where + ": objects[" + std::to_string(i) + "]", out.kinds));
+          to_object(list[i], where + ": objects[" + std::to_string(i) + "]", out.kinds, out.files));
     }
   }
   if (top.has("visits")) {
@@ -343,12 +251,12 @@ Loaded load(const std::filesystem::path& file, int depth) {
     for (std::size_t i = 0; i < visits.size(); ++i) {
       YamlFields visit(visits[i], where + ": visits[" + std::to_string(i) + "]");
       if (i > 0) objects = settled(objects);
-      apply_changes(visit, out.kinds, objects);
+      apply_changes(visit, out.kinds, out.files, objects);
       scenario.visits.push_back({visit.text("name"), objects});
       visit.finish();
     }
   } else {
-    apply_changes(top, out.kinds, objects);
+    apply_changes(top, out.kinds, out.files, objects);
     scenario.visits.push_back({scenario.name, objects});
   }
   top.finish();

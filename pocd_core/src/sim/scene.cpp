@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "pocd/sim/triangle_mesh.hpp"
+
 namespace pocd {
 
 Pose upright_pose(const Eigen::Vector3d& position_m, double yaw_rad) {
@@ -21,6 +23,13 @@ OrientedBox bounding_box(const SceneObject& object) {
   Eigen::Array3d low = Eigen::Array3d::Constant(1e9), high = Eigen::Array3d::Constant(-1e9);
   for (const ScenePart& part : object.parts) {
     const Pose T_H_P = T_H_W * object.T_W_O * part.T_O_P;
+    if (part.shape == Shape::kMesh) {
+      for (const Eigen::Vector3f& vertex : part.mesh->vertices()) {
+        const Eigen::Array3d p_H = T_H_P * vertex.cast<double>();
+        low = low.min(p_H), high = high.max(p_H);
+      }
+      continue;
+    }
     Eigen::Vector3d half = 0.5 * part.size_m;
     if (part.shape == Shape::kCylinder) half.y() = half.x();
     // A rotation's absolute values map half edges to the half extents of the enclosing box.

@@ -5,6 +5,7 @@
 #include "hash_noise.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/sim/sensor_model.hpp"
+#include "sensor_edges.hpp"
 
 namespace pocd {
 namespace {
@@ -57,39 +58,6 @@ class SmoothField {
   std::vector<float> knots_;
 };
 
-/// Stereo sees no match just beside a nearer surface: marks far-side pixels within `reach` of an
-/// edge.
-cv::Mat far_side_of_edges(const cv::Mat& depth_m, int reach) {
-  cv::Mat marked = cv::Mat::zeros(depth_m.size(), CV_8UC1);
-  const auto far_of = [](float z, float neighbour) {
-    return neighbour > 0.0f && (z == 0.0f || z - neighbour > 0.05f + 0.03f * neighbour);
-  };
-  for (int v = 0; v < depth_m.rows; ++v) {
-    const float* z = depth_m.ptr<float>(v);
-    const float* below = v + 1 < depth_m.rows ? depth_m.ptr<float>(v + 1) : nullptr;
-    for (int u = 0; u < depth_m.cols; ++u) {
-      if (u + 1 < depth_m.cols) {
-        if (far_of(z[u], z[u + 1])) {
-          for (int k = 0; k < reach && u - k >= 0; ++k) marked.at<std::uint8_t>(v, u - k) = 1;
-        } else if (far_of(z[u + 1], z[u])) {
-          for (int k = 1; k <= reach && u + k < depth_m.cols; ++k) {
-            marked.at<std::uint8_t>(v, u + k) = 1;
-          }
-        }
-      }
-      if (below == nullptr) continue;
-      if (far_of(z[u], below[u])) {
-        for (int k = 0; k < reach && v - k >= 0; ++k) marked.at<std::uint8_t>(v - k, u) = 1;
-      } else if (far_of(below[u], z[u])) {
-        for (int k = 1; k <= reach && v + k < depth_m.rows; ++k) {
-          marked.at<std::uint8_t>(v + k, u) = 1;
-        }
-      }
-    }
-  }
-  return marked;
-}
-
 /// floor(mean) or one more, so that the mean is met.
 int draw_count(double mean, Random& random) {
   return static_cast<int>(std::floor(mean + random.uniform()));
@@ -138,6 +106,9 @@ SensorModel SensorModel::perfect() {
 
 void degrade_depth(const SensorModel& model, const NoiseKey& key, cv::Mat& depth_m) {
   POCD_CHECK(depth_m.type() == CV_32FC1 && depth_m.isContinuous());
+  if (model.fattening_px > 0.0) fatten_edges(model, key, depth_m);
+  if (model.flying_px > 0.0 && model.flying_share > 0.0) add_flying_pixels(model, key, depth_m);
+  if (model.range_hole_share > 0.0) punch_range_holes(model, key, depth_m);
   const bool noisy = model.depth_base_m > 0.0 || model.depth_quadratic_per_m > 0.0;
   const int reach = static_cast<int>(std::lround(model.edge_hole_px));
   const cv::Mat edges = reach > 0 && model.edge_hole_probability > 0.0

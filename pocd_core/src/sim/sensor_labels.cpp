@@ -7,6 +7,7 @@
 #include "hash_noise.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/sim/sensor_model.hpp"
+#include "sensor_edges.hpp"
 
 namespace pocd {
 namespace {
@@ -108,6 +109,8 @@ void degrade_labels(const SensorModel& model, const NoiseKey& key, int label_div
     }
   }
   if (model.label_blobs_per_frame > 0.0) wrong_blobs(model, key, label_divisor, labels);
+  if (model.label_stride_px > 1) coarsen_masks(model, labels);
+  if (model.label_bleed_px > 0.0) bleed_masks(model, key, labels);
   if (model.label_border_px > 0.0) ragged_borders(model, key, labels);
 }
 

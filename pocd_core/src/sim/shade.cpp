@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "hash_noise.hpp"
+#include "pocd/sim/triangle_mesh.hpp"
 
 namespace pocd {
 namespace {
@@ -70,6 +71,14 @@ Eigen::Vector3f normal_of_hit(const ScenePart& part, const Eigen::Vector3f& p_P,
   return normal;
 }
 
+/// `p_P` was met by a ray from the camera: the same ray says which triangle it was.
+Eigen::Vector3f normal_of_mesh(const TriangleMesh& mesh, const Eigen::Vector3f& p_P,
+                               const Eigen::Vector3f& camera_P) {
+  const Eigen::Vector3f ray = p_P - camera_P;
+  const auto hit = mesh.cast_with_normal(camera_P, ray, 0.0f, 1.01f);
+  return hit ? hit->normal : Eigen::Vector3f(-ray.normalized());
+}
+
 }  // namespace
 
 Shader::Shader(const Scene& scene, const CameraModel& camera, const Pose& T_W_C) : camera_(camera) {
@@ -94,7 +103,9 @@ void Shader::shade_row(int v, const float* depth_m, const std::int32_t* part_id,
     const Eigen::Vector3f p_C = camera_.back_project(u, v, depth_m[u]).cast<float>();
     const Eigen::Vector3f p_P = painted.R_P_C * p_C + painted.camera_P;
     const Eigen::Vector3f half = 0.5f * painted.part->size_m.cast<float>();
-    const Eigen::Vector3f normal_P = normal_of_hit(*painted.part, p_P, half);
+    const Eigen::Vector3f normal_P = painted.part->shape == Shape::kMesh
+                                         ? normal_of_mesh(*painted.part->mesh, p_P, painted.camera_P)
+                                         : normal_of_hit(*painted.part, p_P, half);
     const float lambert = std::max(0.0f, (painted.R_W_P * normal_P).dot(kToLight_W));
     // Light falls off a little with distance, which gives the picture depth.
     const float fog = 1.15f / (1.0f + 0.03f * depth_m[u]);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pocd/sim/sim_reader.hpp"
+#include "pocd/sim/triangle_mesh.hpp"
 
 namespace pocd {
 namespace {
@@ -87,6 +88,47 @@ TEST(SceneTruth, SurfaceDistanceIsExactForABox) {
   EXPECT_NEAR(surface_distance(scene, {0, 0, 0.5}, 9.0), 0.25, 1e-12) << "inside";
   EXPECT_NEAR(surface_distance(scene, {0.55, 0.65, 0.5}, 9.0), 0.5, 1e-12) << "an edge";
   EXPECT_NEAR(surface_distance(scene, {9, 0, 0}, 1.0), 1.0, 1e-12) << "limited";
+}
+
+/// A frame of four thin posts, 0.5 x 0.5 x 1 m: next to nothing of it lies on the faces of its box.
+SceneObject posts(const std::string& name, double x, double y) {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Eigen::Vector3i> triangles;
+  for (const float px : {-0.15f, 0.15f}) {
+    for (const float py : {-0.15f, 0.15f}) {
+      // A leaning blade: it touches the box's faces with its ends only.
+      const int first = static_cast<int>(vertices.size());
+      for (const float z : {0.0f, 1.0f}) {
+        const float lean = (px > 0 ? 0.1f : -0.1f) * z;
+        vertices.emplace_back(px + lean, py - 0.05f, z);
+        vertices.emplace_back(px + lean, py + 0.05f, z);
+      }
+      triangles.emplace_back(first, first + 1, first + 2);
+      triangles.emplace_back(first + 1, first + 3, first + 2);
+    }
+  }
+  SceneObject object = box_object(name, x, y);
+  object.parts[0].shape = Shape::kMesh;
+  object.parts[0].mesh = std::make_shared<const TriangleMesh>(vertices, triangles, "posts");
+  object.parts[0].size_m = object.parts[0].mesh->size_m();
+  return object;
+}
+
+TEST(SceneTruth, AMeshIsSeenByItsSurfaceAndNotByItsBox) {
+  Scenario scenario = two_visits();
+  scenario.visits = {{"before", {posts("gone", 2.5, 0.8)}}, {"after", {posts("come", 6, 0.8)}}};
+  const SceneTruth truth = scene_truth(scenario, SceneTruthOptions(), nullptr);
+  ASSERT_EQ(truth.changes.size(), 2u);
+  for (const SeenChange& seen : truth.changes) {
+    ASSERT_TRUE(seen.clear_frame()) << seen.change.name;
+  }
+  EXPECT_LT(*truth.changes[0].clear_frame(), truth.visit_begin[1] + 15);
+  EXPECT_GT(*truth.changes[1].clear_frame(), truth.visit_begin[1] + 30);
+  Scene scene;
+  scene.objects = {posts("a", 0, 0)};
+  EXPECT_NEAR(surface_distance(scene, {0.15, -0.15, 0.0}, 1.0), 0.0, 1e-6);
+  EXPECT_GT(surface_distance(scene, {0.0, 0.0, 0.5}, 1.0), 0.15) << "the middle is free";
+  EXPECT_EQ(surface_distance(scene, {9, 0, 0}, 1.0), 1.0) << "limited";
 }
 
 TEST(SceneTruth, VisibleSurfaceIsOfTheLastVisitAndNoFloor) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <thread>
+
 #include "map_fixtures.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/map/mesh.hpp"
@@ -142,6 +144,36 @@ TEST(TsdfMap, DirtyBlocksAreThoseThatChanged) {
   // Weights are at their cap and the distances do not move: nothing changes any more.
   map.integrate(view.input(), pool);
   EXPECT_TRUE(map.take_dirty().empty());
+}
+
+TEST(TsdfMap, ListOfDirtyBlocksIsBoundedThoughNobodyTakesIt) {
+  TsdfMap map(coarse_config());
+  // Eight blocks come and go, as those of free space do around something that moves.
+  for (int i = 0; i < 200'000; ++i) {
+    VoxelBlock& block = map.touch({i % 8, 0, 0});
+    block.owner[0] = 5, block.weight[0] = 3;
+    map.clear_object(ObjectId{5});
+  }
+  EXPECT_EQ(map.block_count(), 0u);
+  EXPECT_LT(map.memory_status().memory_bytes, 1u << 20);
+  EXPECT_EQ(map.take_dirty().size(), 8u);
+  EXPECT_TRUE(map.take_dirty().empty());
+}
+
+TEST(TsdfMap, ReadersBesideEachOtherAreAllCounted) {
+  TsdfMap map(coarse_config());
+  for (int i = 0; i < 16; ++i) map.touch({i, 0, 0});
+  const TsdfMap& read = map;
+  const MapVisits before = read.visits();
+  constexpr int kThreads = 4, kReads = 20'000;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&read] {
+      for (int i = 0; i < kReads; ++i) read.sorted_keys();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(read.visits().blocks - before.blocks, 16u * kThreads * kReads);
 }
 
 TEST(TsdfMap, ImpossibleSettingsAreRejected) {

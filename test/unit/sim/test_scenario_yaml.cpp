@@ -76,6 +76,26 @@ TEST(ScenarioYaml, LeaningThingsStandOnTheFloor) {
   EXPECT_NEAR(moved.pose.yaw_rad, M_PI / 2, 1e-12);
 }
 
+TEST(ScenarioYaml, MeshesAndSensorsAreFilesBesideTheScenarioOrItsBase) {
+  const ScratchFolder folder;
+  folder.write("stage/shapes/wedge.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 0.5\nf 1 2 4\nf 2 3 4\n");
+  folder.write("stage/far.yaml", "max_range_m: 4\nflying_px: 2\n");
+  folder.write("stage/base.yaml", kHead + "sensor: far.yaml\nkinds: {wedge: {class: 9, mesh: shapes/wedge.obj}}\n");
+  folder.write("s.yaml",
+               "name: s\nbase: stage/base.yaml\nobjects:\n"
+               "- {name: a, kind: wedge, at: [1, 2, 90]}\n"
+               "- {name: b, class: 7, z: 1, parts: [{mesh: shapes/wedge.obj, scale: 2, at: [0, 0, 1]}]}\n");
+  const Scenario scenario = load_scenario(folder / "s.yaml");
+  EXPECT_EQ(scenario.sensor.max_range_m, 4.0);
+  EXPECT_EQ(scenario.sensor.flying_px, 2.0);
+  EXPECT_EQ(scenario.sensor.depth_base_m, SensorModel().depth_base_m);
+  const auto objects = objects_after(scenario, 0);
+  EXPECT_NEAR((objects[0].box.size_m - Eigen::Vector3d(2, 1, 0.5)).norm(), 0.0, 1e-6);
+  EXPECT_NEAR((objects[0].box.pose.position_W - Eigen::Vector3d(1, 2, 0.25)).norm(), 0.0, 1e-6);
+  EXPECT_NEAR((objects[1].box.size_m - Eigen::Vector3d(4, 2, 1)).norm(), 0.0, 1e-6);
+  EXPECT_NEAR(objects[1].box.pose.position_W.z(), 2.5, 1e-6);
+}
+
 TEST(ScenarioYaml, UnknownKeysNameFileAndKey) {
   for (const std::string& yaml :
        {kHead + "colour: red\n", kHead + kBox.substr(0, kBox.size() - 3) + ", colour: 1}]\n",
@@ -108,6 +128,11 @@ TEST(ScenarioYaml, OneDefectOneLine) {
       {kHead + kBox + "changes: [{teleport: box}]\n", "none of"},
       {kHead + kBox + "changes: [{add: {name: box, class: 7, size: [1, 1, 1]}}]\n", "two objects"},
       {kHead + "sensor: great\n", "'great'"},
+      {kHead + "sensor: great.yaml\n", "'great.yaml'"},
+      {kHead + "objects: [{name: b, class: 7, mesh: no.obj}]\n", "no file 'no.obj'"},
+      {kHead + "objects: [{name: b, class: 7, mesh: s.yaml}]\n", "s.yaml:1: unknown keyword"},
+      {kHead + "objects: [{name: b, class: 7, mesh: s.yaml, scale: 0}]\n", "'scale' must be > 0"},
+      {kHead + "objects: [{name: b, class: 7, mesh: s.yaml, scale: x}]\n", "a number"},
       {kHead + "sensor: {random_hole_share: 2}\n", "must be in"},
       {kHead + "base: missing.yaml\n", "missing.yaml"},
       {kHead + "base: s.yaml\n", "too deeply"},

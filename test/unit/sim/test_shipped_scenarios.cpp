@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pocd/sim/scenario_yaml.hpp"
+#include "pocd/sim/triangle_mesh.hpp"
 #include "pocd/sim/truth.hpp"
 
 namespace pocd {
@@ -18,7 +19,8 @@ std::vector<fs::path> shipped() {
   std::vector<fs::path> files;
   for (const auto& entry :
        fs::recursive_directory_iterator(fs::path(POCD_SOURCE_DIR) / "config/sim")) {
-    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+    const bool sensor = entry.path().parent_path().filename() == "sensors";
+    if (entry.path().extension() == ".yaml" && !sensor) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -28,8 +30,29 @@ fs::path torwic(const std::string& name) {
   return fs::path(POCD_SOURCE_DIR) / "config/sim/torwic" / (name + ".yaml");
 }
 
+/// Points of a's meshes lie in b's solids; the boxes of meshes say nothing, since things lie in them.
+bool meshes_reach_into(const SceneObject& a, const SceneObject& b) {
+  for (const ScenePart& mesh : a.parts) {
+    if (mesh.shape != Shape::kMesh) continue;
+    for (const Eigen::Vector3f& point : mesh.mesh->sample(2000)) {
+      for (const ScenePart& solid : b.parts) {
+        if (solid.shape == Shape::kMesh) continue;
+        const Eigen::Vector3d p =
+            (b.T_W_O * solid.T_O_P).inverse() * (a.T_W_O * mesh.T_O_P * point.cast<double>());
+        const Eigen::Vector3d half = 0.5 * solid.size_m;
+        const bool across = solid.shape == Shape::kBox
+                                ? std::abs(p.x()) < half.x() - 1e-5 && std::abs(p.y()) < half.y() - 1e-5
+                                : p.head<2>().norm() < half.x() - 1e-5;
+        if (across && std::abs(p.z()) < half.z() - 1e-5) return true;
+      }
+    }
+  }
+  return false;
+}
+
 /// Things overlap when any two of their parts do; a rack's shelves may hold boxes.
 bool overlap(const SceneObject& a, const SceneObject& b) {
+  if (meshes_reach_into(a, b) || meshes_reach_into(b, a)) return true;
   const auto boxes = [](const SceneObject& object) {
     std::vector<OrientedBox> out;
     for (const ScenePart& part : object.parts) {
@@ -41,9 +64,12 @@ bool overlap(const SceneObject& a, const SceneObject& b) {
     }
     return out;
   };
-  for (const OrientedBox& first : boxes(a)) {
-    for (const OrientedBox& second : boxes(b)) {
-      if (boxes_overlap(first, second, 1e-6)) return true;
+  const std::vector<OrientedBox> boxes_a = boxes(a), boxes_b = boxes(b);
+  for (std::size_t i = 0; i < boxes_a.size(); ++i) {
+    for (std::size_t k = 0; k < boxes_b.size(); ++k) {
+      const bool mesh_a = a.parts[i].shape == Shape::kMesh;
+      if (mesh_a != (b.parts[k].shape == Shape::kMesh)) continue;
+      if (boxes_overlap(boxes_a[i], boxes_b[k], mesh_a ? 1e-5 : 1e-6)) return true;
     }
   }
   return false;
@@ -129,6 +155,32 @@ INSTANTIATE_TEST_SUITE_P(All, Shipped, testing::ValuesIn(shipped()), [](const au
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 });
+
+TEST(ThingsScenarios, EachHasAStillTwin) {
+  const fs::path folder = fs::path(POCD_SOURCE_DIR) / "config/sim/things";
+  int scenes = 0;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().stem().string();
+    if (entry.path().extension() != ".yaml" || name == "stage") continue;
+    const Scenario scenario = load_scenario(entry.path());
+    ASSERT_EQ(scenario.visits.size(), 2u) << name;
+    EXPECT_GT(scenario.sensor.flying_px, 0.0) << name;
+    if (name.find("_still") != std::string::npos) {
+      EXPECT_TRUE(changes_of(scenario, 1).empty()) << name;
+      continue;
+    }
+    ++scenes;
+    const auto changes = changes_of(scenario, 1);
+    for (const ChangeKind kind : {ChangeKind::kAdded, ChangeKind::kRemoved, ChangeKind::kMoved}) {
+      EXPECT_TRUE(std::any_of(changes.begin(), changes.end(),
+                              [&](const TruthChange& change) { return change.kind == kind; }))
+          << name << " " << to_string(kind);
+    }
+    const Scenario still = load_scenario(folder / (name + "_still.yaml"));
+    EXPECT_EQ(objects_after(still, 0).size(), objects_after(scenario, 1).size()) << name;
+  }
+  EXPECT_GE(scenes, 4);
+}
 
 TEST(TorwicScenarios, ChangeWhatTheirDescriptionsSay) {
   struct Expected {

@@ -20,8 +20,8 @@ struct RenderedFrame {
 
 /// Casts one ray through the centre of every pixel. Rays have unit z in the optical frame, so that
 /// the ray parameter is the depth; a convex part is met where the entry parameter over its slabs
-/// (Kay and Kajiya, SIGGRAPH 1986) is below the exit parameter. A part that contains the camera is
-/// not seen. Depth error (single precision) is below 1e-4 m within 15 m. Same bits for every pool,
+/// (Kay and Kajiya, SIGGRAPH 1986) is below the exit parameter, a mesh at its first triangle. A box
+/// or cylinder that contains the camera is not seen. Depth error (single precision) is below 1e-4 m within 15 m. Same bits for every pool,
 /// or none.
 RenderedFrame render(const Scene& scene, const CameraModel& camera, const Pose& T_W_C,
                      bool with_color, ThreadPool* pool = nullptr);

@@ -1,8 +1,9 @@
-// An analytic world: solid boxes and upright cylinders, grouped to objects. Depth seen by a camera
-// is exact, so that tests and evaluation have a truth that no renderer's mesh or sampling blurs.
+// The simulated world: solid boxes, upright cylinders and triangle meshes, grouped to objects. Depth
+// seen by a camera is exact, so that tests and evaluation have a truth that no sampling blurs.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,19 +11,23 @@
 
 namespace pocd {
 
-enum class Shape { kBox, kCylinder };
+class TriangleMesh;
+
+enum class Shape { kBox, kCylinder, kMesh };
 
 /// How a surface is painted in the colour image; no effect on depth or labels.
 enum class Texture { kPlain, kCardboard, kTarp, kConcrete, kWood };
 
 /// One solid. Its frame P has the origin at the centre of the solid.
 /// kBox: edges size_m along x, y, z. kCylinder: axis along z, diameter size_m.x, height size_m.z.
+/// kMesh: size_m is the mesh's bounding box, whose centre is the origin.
 struct ScenePart {
   Shape shape = Shape::kBox;
   Eigen::Vector3d size_m = Eigen::Vector3d::Ones();
   Pose T_O_P = Pose::Identity();
   Eigen::Vector3d rgb = {150, 150, 150};  ///< each in [0, 255]
   Texture texture = Texture::kPlain;
+  std::shared_ptr<const TriangleMesh> mesh = nullptr;  ///< of kMesh, and only there
 };
 
 /// Where an object that moves during a visit is at `time_s` after the start of the visit.
@@ -54,8 +59,8 @@ struct Scene {
   std::vector<SceneObject> objects;
 };
 
-/// Smallest box around the object's parts with the object's heading (exact for boxes and upright
-/// cylinders).
+/// Smallest box around the object's parts with the object's heading (exact for boxes, upright
+/// cylinders and meshes).
 OrientedBox bounding_box(const SceneObject& object);
 
 /// Pose in the track at time_s; T_W_O where there is no track.

@@ -10,8 +10,9 @@
 
 namespace pocd {
 
-/// Every effect can be switched off by its own field (0). The same seed and frame number give the
-/// same errors, whatever was rendered before.
+/// Works on images alone, whatever made them. Every effect can be switched off by its own field (0),
+/// and those of borders and far ranges are off unless asked for. The same seed and frame number give
+/// the same errors, whatever was rendered before.
 struct SensorModel {
   double depth_base_m = 0.002;
   double depth_quadratic_per_m = 0.0025;
@@ -21,10 +22,16 @@ struct SensorModel {
   double hole_blobs_per_frame = 3.0;
   double edge_hole_px = 2.0;
   double edge_hole_probability = 0.6;
+  double fattening_px = 0.0;
+  double flying_px = 0.0;
+  double flying_share = 0.0;
+  double range_hole_share = 0.0;
   double quantum_m = 0.001;
   double min_range_m = 0.25;
   double max_range_m = 8.0;
   double label_border_px = 2.0;
+  double label_bleed_px = 0.0;
+  int label_stride_px = 1;
   double label_blobs_per_frame = 1.0;
   double label_blob_radius_px = 12.0;
   std::string label_blob_classes = "0,4,5,6,7,8,9,12";
@@ -61,12 +68,23 @@ struct SensorModel {
           "Pixels this near to a depth edge, on its far side, lose their return [px].");
     visit("edge_hole_probability", edge_hole_probability, Range{0.0, 1.0},
           "Probability that such a pixel has no return.");
+    visit("fattening_px", fattening_px, Range{0.0, 10.0},
+          "Things grow by up to this at depth edges: a stereo window takes the nearer side [px].");
+    visit("flying_px", flying_px, Range{0.0, 10.0},
+          "Pixels this near to a depth edge, on its far side, may fly between its sides [px].");
+    visit("flying_share", flying_share, Range{0.0, 1.0}, "Share of these pixels that do.");
+    visit("range_hole_share", range_hole_share, Range{0.0, 1.0},
+          "Share of cells without a return at max_range_m; grows with the square of the range.");
     visit("quantum_m", quantum_m, Range{0.0, 0.1},
           "Depth is rounded to multiples of this [m]; 0: not.");
     visit("min_range_m", min_range_m, Range{0.0, 5.0}, "No return below this depth [m].");
     visit("max_range_m", max_range_m, Range{0.1, 1000.0}, "No return above this depth [m].");
     visit("label_border_px", label_border_px, Range{0.0, 20.0},
           "Amplitude of the raggedness of mask borders [px].");
+    visit("label_bleed_px", label_bleed_px, Range{0.0, 20.0},
+          "A whole mask reaches up to this far into its neighbour's, changing slowly [px].");
+    visit("label_stride_px", label_stride_px, Range{1, 64},
+          "Masks are made at a resolution lower by this factor [px].");
     visit("label_blobs_per_frame", label_blobs_per_frame, Range{0.0, 100.0},
           "Mean number of round blobs of a wrong class per frame.");
     visit("label_blob_radius_px", label_blob_radius_px, Range{0.0, 200.0},
