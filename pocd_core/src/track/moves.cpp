@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "pocd/association/point_to_plane_icp.hpp"
 #include "tracker_step.hpp"
@@ -17,7 +19,9 @@ constexpr double kEmptyShare = 0.15;
 constexpr double kSeenShare = 0.25;
 /// A thing in a place that was never seen empty is the departed one only when it is nearer than
 /// this share of its length.
-constexpr double kNearShare = 0.5;
+constexpr double kNearShare = 1.0;
+/// Share of the surface that a motion must explain more for each of its lengths that it is longer.
+constexpr double kShortness = 0.1;
 constexpr std::size_t kAlignPoints = 600;
 
 double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
@@ -35,18 +39,24 @@ bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) 
 
 }  // namespace
 
-bool ObjectTracker::is_departed(const Departure& departure, const LibraryObject& found) const {
-  if (departure.class_id != found.class_id || departure.id == found.id) return false;
+std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const LibraryObject& found) const {
+  if (departure.class_id != found.class_id || departure.id == found.id) return std::nullopt;
+  static const bool dbg = getenv("DBGM");
+#define M(...) do { if (dbg) { fprintf(stderr, "dep %d(%.2f %.2f) found %d(%.2f %.2f): ", (int)to_index(departure.id), departure.box.pose.position_W.x(), departure.box.pose.position_W.y(), (int)to_index(found.id), found.box.pose.position_W.x(), found.box.pose.position_W.y()); fprintf(stderr, __VA_ARGS__); } } while (0)
+  if (departure.in_place_ns > found.first_seen_ns) M("in place %.2f s after first seen\n", (departure.in_place_ns - found.first_seen_ns) * 1e-9);
   // What was seen in its place when the new one was there, too, is another thing.
-  if (departure.in_place_ns > found.first_seen_ns) return false;
+  if (departure.in_place_ns > found.first_seen_ns) return std::nullopt;
   const double slack_m = 3.0 * config_.map.voxel_size_m;
   const double distance_m =
       (departure.box.pose.position_W - found.box.pose.position_W).head<2>().norm();
-  if (distance_m > config_.state.relocation_reach_m) return false;
-  if (distance_m < 0.5 * config_.change.tau_m) return false;
-  if (found.arrival != Arrival::kArrived && distance_m > kNearShare * longest_side(departure.box))
-    return false;
-  if (!may_be(found.box, departure.box, slack_m)) return false;
+  if (distance_m > config_.state.relocation_reach_m) M("distance %.2f\n", distance_m);
+  // Of each only a part may be known: how far it went is told by the alignment.
+  const double parts_m = 0.5 * (departure.box.size_m.head<2>().norm() + found.box.size_m.head<2>().norm());
+  if (distance_m > config_.state.relocation_reach_m + parts_m) return std::nullopt;
+  if (distance_m < 0.5 * config_.change.tau_m) M("too near %.2f\n", distance_m);
+  if (found.arrival != Arrival::kArrived && distance_m > kNearShare * longest_side(departure.box)) M("not arrived %d distance %.2f of %.2f\n", (int)found.arrival, distance_m, longest_side(departure.box));
+  if (!may_be(found.box, departure.box, slack_m)) M("may not be: found %.2f %.2f %.2f departed %.2f %.2f %.2f\n", found.box.size_m.x(), found.box.size_m.y(), found.box.size_m.z(), departure.box.size_m.x(), departure.box.size_m.y(), departure.box.size_m.z());
+  if (!may_be(found.box, departure.box, slack_m)) return std::nullopt;
 
   Points points, normals, source;
   for (const Surfel& s : departure.surfels) {
@@ -62,19 +72,45 @@ bool ObjectTracker::is_departed(const Departure& departure, const LibraryObject&
   IcpOptions options;
   options.max_iterations = config_.association.icp_iterations;
   options.robust_scale_m = config_.map.voxel_size_m;
+  // As it stands, and with the boxes' sides along each other; by the middles, and, for of each only a
+  // part may be known, by either end.
+  std::vector<Pose> starts{Pose::Identity()};
   const double turn_rad = departure.box.pose.yaw_rad - found.box.pose.yaw_rad;
+  const auto along_of = [](const OrientedBox& box) {
+    const double yaw = box.pose.yaw_rad + (box.size_m.x() < box.size_m.y() ? M_PI_2 : 0.0);
+    return Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+  };
+  const Eigen::Vector3d along_W = along_of(departure.box);
+  const double play_m = 0.5 * (longest_side(departure.box) - longest_side(found.box));
   for (int quarter = -1; quarter < 4; ++quarter) {
-    // First as it stands, then with the boxes' sides along each other.
     Pose start = Pose::Identity();
     if (quarter >= 0) {
       start.linear() = Eigen::AngleAxisd(turn_rad + quarter * M_PI / 2.0, Eigen::Vector3d::UnitZ())
                            .toRotationMatrix();
     }
-    start.translation() =
-        departure.box.pose.position_W - start.linear() * found.box.pose.position_W;
+    for (const double slid_m : {0.0, play_m, -play_m}) {
+      if (slid_m != 0.0 && std::abs(play_m) < inlier_m) continue;
+      start.translation() = departure.box.pose.position_W + slid_m * along_W -
+                            start.linear() * found.box.pose.position_W;
+      starts.push_back(start);
+    }
+  }
+  std::optional<Pose> best;
+  double best_score = 0.0;
+  for (const Pose& start : starts) {
     const IcpResult icp = point_to_plane_icp(target, source, options, start);
     if (icp.dissimilarity > kOutlierShare) continue;
-    const Eigen::Isometry3f T = icp.T_target_source.inverse().cast<float>();
+    const Pose T_new_old = icp.T_target_source.inverse();
+    double moved_m = 0.0;  // of its points: what turns in place moves, too
+    for (const Surfel& s : departure.surfels) {
+      const Eigen::Vector3d p = s.point_W.cast<double>();
+      moved_m += (T_new_old * p - p).norm();
+    }
+    moved_m /= static_cast<double>(departure.surfels.size());
+    if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m) continue;
+    if (found.arrival != Arrival::kArrived && moved_m > kNearShare * longest_side(departure.box))
+      continue;
+    const Eigen::Isometry3f T = T_new_old.cast<float>();
     std::size_t empty = 0, seen = 0;
     for (const Surfel& s : departure.surfels) {
       const Eigen::Vector3f there = T * s.point_W;
@@ -85,12 +121,16 @@ bool ObjectTracker::is_departed(const Departure& departure, const LibraryObject&
       }
     }
     const auto all = static_cast<double>(departure.surfels.size());
-    if (static_cast<double>(empty) <= kEmptyShare * static_cast<double>(seen + empty) &&
-        static_cast<double>(seen) >= kSeenShare * all) {
-      return true;
+    M("  empty %zu seen %zu all %zu moved %.2f dissimilar %.2f\n", empty, seen, departure.surfels.size(), moved_m, icp.dissimilarity);
+    if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty) ||
+        static_cast<double>(seen) < kSeenShare * all) {
+      continue;
     }
+    // Of motions that explain the same, the shortest.
+    const double score = (static_cast<double>(seen) - static_cast<double>(empty)) / all - kShortness * moved_m / longest_side(departure.box);
+    if (!best || score > best_score) best = T_new_old, best_score = score;
   }
-  return false;
+  return best;
 }
 
 bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& object) {
@@ -109,21 +149,26 @@ bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& objec
 void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
   departure.evidence.rule = rule;
   LibraryObject* best = nullptr;
+  Pose best_motion = Pose::Identity();
   double best_m = 0.0;
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   for (const ObjectId id :
-       library_.near(departure.box.pose.position_W, config_.state.relocation_reach_m)) {
+       library_.near(departure.box.pose.position_W,
+                     config_.state.relocation_reach_m + 0.5 * departure.box.size_m.head<2>().norm())) {
     LibraryObject* other = library_.find(id);
     const bool open = other->confirmed
                           ? other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns
                           : other->observations >= 2;
-    if (!open || other->id == departure.part_of || !is_departed(departure, *other)) continue;
+    if (!open || other->id == departure.part_of) continue;
+    const auto motion = motion_of(departure, *other);
+    if (!motion) continue;
     const double distance_m =
         (departure.box.pose.position_W - other->box.pose.position_W).head<2>().norm();
-    if (!best || distance_m < best_m) best = other, best_m = distance_m;
+    if (best && distance_m >= best_m) continue;
+    best = other, best_m = distance_m, best_motion = *motion;
   }
   if (best) {
-    report_move(step, *best, departure, rule);
+    report_move(step, *best, departure, best_motion, rule);
     return;
   }
   ObjectEvent event;
@@ -143,17 +188,20 @@ void ObjectTracker::depart(Step& step, Departure departure, const std::string& r
 
 bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
   const Departure* best = nullptr;
+  Pose best_motion = Pose::Identity();
   double best_m = 0.0;
   for (const Departure& d :
        departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
-    if (!is_departed(d, object)) continue;
+    const auto motion = motion_of(d, object);
+    if (!motion) continue;
     const double distance_m =
         (d.box.pose.position_W - object.box.pose.position_W).head<2>().norm();
-    if (!best || distance_m < best_m) best = &d, best_m = distance_m;
+    if (best && distance_m >= best_m) continue;
+    best = &d, best_m = distance_m, best_motion = *motion;
   }
   if (!best) return false;
   const Departure from = *best;
-  report_move(step, object, from, "found_again");
+  report_move(step, object, from, best_motion, "found_again");
   return true;
 }
 
@@ -168,7 +216,7 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
 }
 
 void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departure& from,
-                                const std::string& rule) {
+                                const Pose& T_new_old,                                const std::string& rule) {
   const std::optional<ObjectId> absorbed =
       found.confirmed ? std::make_optional(found.id) : std::nullopt;
   const ObjectId old = found.id;
@@ -179,6 +227,19 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   library_.rename(old, from.id);
   auto& retired = step.result.retired;
   retired.erase(std::remove(retired.begin(), retired.end(), from.id), retired.end());
+  // Its other sides went with it, but for those whose place was seen empty.
+  std::vector<Surfel> sides;
+  const Eigen::Isometry3f T = T_new_old.cast<float>();
+  for (Surfel s : from.surfels) {
+    s.point_W = T * s.point_W;
+    s.normal_W = T.linear() * s.normal_W;
+    s.seen_through = 0;
+    if (!seen_empty(step.map, s.point_W)) sides.push_back(s);
+  }
+  found.model.add(sides);
+  found.icp_target.reset();
+  found.most_surfels = found.model.surfels().size();
+  refit_box(step, found);
   found.first_seen_ns = from.first_seen_ns;
   found.seen_by.insert(from.seen_by.begin(), from.seen_by.end());
   found.confirmed = true;

@@ -165,6 +165,7 @@ void ObjectTracker::join_objects(Step& step) {
         joined.emplace_back(x.id, y.id);
         continue;
       }
+      if (getenv("DBGM")) fprintf(stderr, "J frame %d: %d %d looks %d connected %d\n", (int)step.frame.sequence, (int)to_index(x.id), (int)to_index(y.id), x.companions[y.id], connected(x, y));
       int& looks = x.companions[y.id];
       if (++looks < enough) continue;
       looks = 0;
@@ -439,7 +440,7 @@ void ObjectTracker::confirm_objects(Step& step) {
 }
 
 LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& found) {
-  (void)step;
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   const bool arrived = found.arrival == Arrival::kArrived;
   const double margin_m = 2.0 * config_.map.voxel_size_m;
   for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
@@ -449,15 +450,14 @@ LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& fo
       continue;
     }
     if (coincide(found, *other)) return other;
-    if (arrived) continue;
+    // What arrived is a side of what arrived lately; what was found, of what stands longer, too.
+    const bool other_arrived = other->arrival == Arrival::kArrived;
+    const bool lately = other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns;
+    if (arrived && !(other_arrived && lately)) continue;
     if (connected(found, *other)) return other;
-    const OrientedBox& box = other->box;
-    const Eigen::AngleAxisd turn(-box.pose.yaw_rad, Eigen::Vector3d::UnitZ());
     std::size_t inside = 0;
-    for (const Surfel& s : found.model.surfels()) {
-      const Eigen::Vector3d at = turn * (s.point_W.cast<double>() - box.pose.position_W);
-      inside += ((at.cwiseAbs() - 0.5 * box.size_m).array() <= margin_m).all();
-    }
+    for (const Surfel& s : found.model.surfels())
+      inside += is_inside(other->box, margin_m, s.point_W);
     if (static_cast<double>(inside) >=
         kInsideShare * static_cast<double>(found.model.surfels().size())) {
       return other;

@@ -84,10 +84,10 @@ class ObjectTracker {
   bool find_origin(Step& step, LibraryObject& object);
   /// Whether a like object near by is being found gone: then the new one may be that one.
   bool origin_in_doubt(const Step& step, const LibraryObject& object);
-  /// Whether `found` is the thing that departed.
-  bool is_departed(const Departure& departure, const LibraryObject& found) const;
+  /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
+  std::optional<Pose> motion_of(const Departure& departure, const LibraryObject& found) const;
   void report_move(Step& step, LibraryObject& found, const Departure& from,
-                   const std::string& rule);
+                   const Pose& T_new_old, const std::string& rule);
   void mark_changed(LibraryObject& object);
   Evidence evidence_of(const Step& step, const LibraryObject& object) const;
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
