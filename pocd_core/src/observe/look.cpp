@@ -22,8 +22,10 @@ constexpr double kContestedShare = 0.25;
 constexpr double kDoubtfulShare = 0.1;
 /// What was measured within its box fits the surface of an object that is in its place.
 constexpr double kFittingShare = 0.75;
-/// Two solid things do not share so much of one place.
+/// A like surface that is nearer than this share of the thing's size leaves no room for two.
 constexpr double kTakenShare = 0.5;
+/// So much of a thing must be measured at a new place that only covers the old one.
+constexpr double kCoveringShare = 0.5;
 constexpr std::size_t kFitBudget = 200;
 /// Points of a surface lie within so many spacings of a surfel, beside their noise.
 constexpr double kFitSpacings = 0.75;
@@ -209,11 +211,11 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     const Eigen::Vector3d& center_W = object.box.pose.position_W;
     if ((match->T_new_old * center_W - center_W).norm() > match->displacement_m + 2.0 * least_m)
       continue;
-    if (before.through < kLeastPoints) {
-      OrientedBox there_box = object.box;
-      there_box.pose.position_W = match->T_new_old * center_W;
-      if (box_overlap(there_box, object.box, 0.0) < kTakenShare) continue;
-    }
+    // Nothing of the old place is seen empty: then the new one must cover it and leave no room for
+    // both, however thick the thing is behind its known side.
+    const bool covers = before.through < kLeastPoints;
+    const double side_m = std::min(object.box.size_m.head<2>().maxCoeff(), object.box.size_m.z());
+    if (covers && match->displacement_m > kTakenShare * side_m) continue;
     std::vector<Surfel> moved = object.model.surfels();
     const Eigen::Isometry3f T = match->T_new_old.cast<float>();
     for (Surfel& s : moved) {
@@ -225,6 +227,7 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
                  there);
     const Tally after = tally_of(there, observations, object.class_id, look.observation);
     D("   through %d here %d before %d around %zu\n", after.through, after.here, before.here, around.points.size());
+    if (covers && after.here < kCoveringShare * there.total) continue;
     if (after.through > kLeftOverShare * (after.here + after.through) || after.here < before.here ||
         after.here < kExplainedShare * static_cast<double>(around.points.size()) ||
         after.here - after.through <= most) {
