@@ -20,8 +20,8 @@ constexpr double kSeenShare = 0.25;
 /// A thing in a place that was never seen empty is the departed one only when it is nearer than
 /// this share of its length.
 constexpr double kNearShare = 1.0;
-/// Share of the surface that a motion must explain more for each of its lengths that it is longer.
-constexpr double kShortness = 0.1;
+/// Share of the surface that a motion must explain more when it is longer by the thing's length.
+constexpr double kShortness = 0.5;
 constexpr std::size_t kAlignPoints = 600;
 
 double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
@@ -97,6 +97,7 @@ std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const L
   }
   std::optional<Pose> best;
   double best_score = 0.0;
+  bool enough = false;
   for (const Pose& start : starts) {
     const IcpResult icp = point_to_plane_icp(target, source, options, start);
     if (icp.dissimilarity > kOutlierShare) continue;
@@ -122,15 +123,18 @@ std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const L
     }
     const auto all = static_cast<double>(departure.surfels.size());
     M("  empty %zu seen %zu all %zu moved %.2f dissimilar %.2f\n", empty, seen, departure.surfels.size(), moved_m, icp.dissimilarity);
-    if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty) ||
-        static_cast<double>(seen) < kSeenShare * all) {
-      continue;
-    }
-    // Of motions that explain the same, the shortest.
-    const double score = (static_cast<double>(seen) - static_cast<double>(empty)) / all - kShortness * moved_m / longest_side(departure.box);
-    if (!best || score > best_score) best = T_new_old, best_score = score;
+    if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty)) continue;
+    // Of motions that explain the same, the shortest: the sides of a box are alike.
+    const double contradicted = static_cast<double>(empty) / static_cast<double>(seen + empty);
+    const double score = 1.0 - icp.dissimilarity - contradicted -
+                         kShortness * moved_m / longest_side(departure.box);
+    M("     score %.2f surfels %zu longest %.2f\n", score, surfels.size(), longest_side(departure.box));
+    if (best && score <= best_score) continue;
+    best_score = score;
+    best = T_new_old;
+    enough = static_cast<double>(seen) >= kSeenShare * all;
   }
-  return best;
+  return enough ? best : std::nullopt;
 }
 
 bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& object) {

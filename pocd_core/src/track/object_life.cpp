@@ -108,7 +108,8 @@ bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) co
   for (const Surfel& s : small.model.surfels()) {
     if (s.hits < 2 || s.seen_through > 0) continue;
     ++checked;
-    contacts += large.model.nearest(s.point_W, reach) != ObjectModel::kNone;
+    const int other = large.model.nearest(s.point_W, reach);
+    contacts += other != ObjectModel::kNone && large.model.surfels()[other].seen_through == 0;
   }
   // A seam, not a spot: about the square root of the smaller surface's size.
   return contacts >= std::max(3.0, 0.5 * std::sqrt(static_cast<double>(checked)));
@@ -165,7 +166,7 @@ void ObjectTracker::join_objects(Step& step) {
         joined.emplace_back(x.id, y.id);
         continue;
       }
-      if (getenv("DBGM")) fprintf(stderr, "J frame %d: %d %d looks %d connected %d\n", (int)step.frame.sequence, (int)to_index(x.id), (int)to_index(y.id), x.companions[y.id], connected(x, y));
+      if (getenv("DBGM")) fprintf(stderr, "J frame %d: %d %d looks %d connected %d boxes x %.2f+-%.2f y %.2f+-%.2f, x %.2f+-%.2f y %.2f+-%.2f\n", (int)step.frame.sequence, (int)to_index(x.id), (int)to_index(y.id), x.companions[y.id], connected(x, y), x.box.pose.position_W.x(), x.box.size_m.x()/2, x.box.pose.position_W.y(), x.box.size_m.y()/2, y.box.pose.position_W.x(), y.box.size_m.x()/2, y.box.pose.position_W.y(), y.box.size_m.y()/2);
       int& looks = x.companions[y.id];
       if (++looks < enough) continue;
       looks = 0;
