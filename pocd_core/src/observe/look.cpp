@@ -227,7 +227,8 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
                  there);
     const Tally after = tally_of(there, observations, object.class_id, look.observation);
     D("   through %d here %d before %d around %zu\n", after.through, after.here, before.here, around.points.size());
-    if (covers && after.here < kCoveringShare * there.total) continue;
+    const double least_share = covers ? kCoveringShare : config.min_visible_share;
+    if (after.here < least_share * there.total) continue;
     if (after.through > kLeftOverShare * (after.here + after.through) || after.here < before.here ||
         after.here < kExplainedShare * static_cast<double>(around.points.size()) ||
         after.here - after.through <= most) {

@@ -294,8 +294,11 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
   departure.box = lost_box;
   departure.surfels = std::move(lost);
   departure.first_seen_ns = object.first_seen_ns;
-  for (const Surfel& s : departure.surfels)
-    departure.in_place_ns = std::max(departure.in_place_ns, s.last_hit_ns);
+  // When most of it was still there: a few points lie on what came after it.
+  std::vector<StampNs> hits;
+  for (const Surfel& s : departure.surfels) hits.push_back(s.last_hit_ns);
+  std::nth_element(hits.begin(), hits.begin() + static_cast<std::ptrdiff_t>(hits.size() / 2), hits.end());
+  departure.in_place_ns = hits[hits.size() / 2];
   departure.departed_ns = step.frame.stamp_ns;
   departure.seen_by = object.seen_by;
   departure.evidence = evidence_of(step, object);
