@@ -16,7 +16,7 @@ constexpr double kOutlierShare = 0.2;
 /// At most this share of the old surface, moved, lies where nothing is.
 constexpr double kEmptyShare = 0.15;
 /// At least this share of the old surface, moved, is seen at the new place.
-constexpr double kSeenShare = 0.25;
+constexpr double kSeenShare = 0.4;
 /// A thing in a place that was never seen empty is the departed one only when it is nearer than
 /// this share of its length.
 constexpr double kNearShare = 1.0;
@@ -247,6 +247,8 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   found.first_seen_ns = from.first_seen_ns;
   found.seen_by.insert(from.seen_by.begin(), from.seen_by.end());
   found.confirmed = true;
+  found.arrival = Arrival::kArrived;
+  found.moved = true;
   found.added_ns.reset();
   found.reported_box = found.box;
   found.lost = 0;

@@ -98,6 +98,13 @@ OrientedBox box_of(const std::vector<Surfel>& surfels) {
 
 }  // namespace
 
+bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) const {
+  // What moved as a whole is one thing; only pieces that arrived with it may be of it.
+  if (a.moved && b.moved) return false;
+  const bool a_arrived = a.arrival == Arrival::kArrived, b_arrived = b.arrival == Arrival::kArrived;
+  return a_arrived == b_arrived;
+}
+
 bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) const {
   const bool a_less = a.model.surfels().size() < b.model.surfels().size();
   const LibraryObject& small = a_less ? a : b;
@@ -140,8 +147,7 @@ void ObjectTracker::join_objects(Step& step) {
       Look& look_b = looks_[b];
       LibraryObject &x = *look_a.object, &y = *look_b.object;
       if (look_b.verdict != Verdict::kInPlace || look_b.contested || x.class_id != y.class_id ||
-          ((x.arrival == Arrival::kArrived) != (y.arrival == Arrival::kArrived) &&
-           !coincide(x, y))) {
+          (!may_be_one(x, y) && !coincide(x, y))) {
         continue;
       }
       bool one_piece = false, apart = false;
@@ -471,6 +477,7 @@ LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& fo
 }
 
 void ObjectTracker::report_changes(Step& step) {
+  if (getenv("DBGM")) for (const auto& e : step.result.events) fprintf(stderr, "EV %d %s #%d (%.2f %.2f %.2f | %.2f %.2f %.2f yaw %.2f) %s abs %d vis %.2f thr %.2f from (%.2f %.2f)\n", (int)step.frame.sequence, e.kind == EventKind::kAdded ? "ADDED" : e.kind == EventKind::kMoved ? "MOVED" : e.kind == EventKind::kRemoved ? "REMOVED" : "UPDATED", (int)to_index(e.object), e.box.pose.position_W.x(), e.box.pose.position_W.y(), e.box.pose.position_W.z(), e.box.size_m.x(), e.box.size_m.y(), e.box.size_m.z(), e.box.pose.yaw_rad, e.evidence.rule.c_str(), e.absorbed ? (int)to_index(*e.absorbed) : 0, 0.0, 0.0, e.previous_box ? e.previous_box->pose.position_W.x() : 0.0, e.previous_box ? e.previous_box->pose.position_W.y() : 0.0);
   std::sort(changed_.begin(), changed_.end());
   changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
   const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);

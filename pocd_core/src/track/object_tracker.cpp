@@ -182,6 +182,8 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   object.moment = {};
   object.in_place_ns = step.frame.stamp_ns;
   object.added_ns.reset();
+  object.arrival = Arrival::kArrived;
+  object.moved = true;
   add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
   object.reported_box = object.box;
   object.lost = 0;

@@ -62,6 +62,8 @@ class ObjectTracker {
   LibraryObject& create(Step& step, ClassId class_id);
   void refit_box(Step& step, LibraryObject& object);
   void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
+  /// Whether what is known of two objects allows that they are one.
+  bool may_be_one(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects of one piece in the image are one piece of surface in the map.
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects are one surface, known twice.

@@ -48,6 +48,7 @@ struct LibraryObject {
   Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();  ///< mean of the surface
   Belief belief;
   Arrival arrival = Arrival::kUnknown;
+  bool moved = false;  ///< it moved as a whole: what it touches is not of it
 
   // Who saw it, when.
   StampNs first_seen_ns = 0;
