@@ -227,8 +227,8 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
                  there);
     const Tally after = tally_of(there, observations, object.class_id, look.observation);
     D("   through %d here %d before %d around %zu\n", after.through, after.here, before.here, around.points.size());
-    const double least_share = covers ? kCoveringShare : config.min_visible_share;
-    if (after.here < least_share * there.total) continue;
+    const int in_view = after.here + after.through + there.occluded + there.unknown;
+    if (after.here < kCoveringShare * in_view || after.here < 0.1 * there.total) continue;
     if (after.through > kLeftOverShare * (after.here + after.through) || after.here < before.here ||
         after.here < kExplainedShare * static_cast<double>(around.points.size()) ||
         after.here - after.through <= most) {

@@ -16,6 +16,10 @@ void Departures::forget(ObjectId id) {
       list_.end());
 }
 
+void Departures::set_asked_far(ObjectId id) {
+  for (Departure& d : list_) d.asked_far |= d.id == id;
+}
+
 void Departures::set_clock_back(StampNs latest_ns) {
   for (Departure& d : list_) {
     for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.departed_ns})

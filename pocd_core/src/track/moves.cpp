@@ -16,12 +16,16 @@ constexpr double kOutlierShare = 0.2;
 /// At most this share of the old surface, moved, lies where nothing is.
 constexpr double kEmptyShare = 0.15;
 /// At least this share of the old surface, moved, is seen at the new place.
-constexpr double kSeenShare = 0.4;
+constexpr double kSeenShare = 0.2;
 /// A thing in a place that was never seen empty is the departed one only when it is nearer than
 /// this share of its length.
 constexpr double kNearShare = 1.0;
 /// Share of the surface that a motion must explain more when it is longer by the thing's length.
 constexpr double kShortness = 0.5;
+/// Moves farther than that are told after this time: another thing may be nearer [s].
+constexpr double kFarWaitS = 1.0;
+/// Share of its length that a thing may have moved to be told so at once.
+constexpr double kAtOnceShare = 0.5;
 constexpr std::size_t kAlignPoints = 600;
 
 double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
@@ -39,7 +43,8 @@ bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) 
 
 }  // namespace
 
-std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const LibraryObject& found) const {
+std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const LibraryObject& found,
+                                               StampNs now_ns) const {
   if (departure.class_id != found.class_id || departure.id == found.id) return std::nullopt;
   static const bool dbg = getenv("DBGM");
 #define M(...) do { if (dbg) { fprintf(stderr, "dep %d(%.2f %.2f) found %d(%.2f %.2f): ", (int)to_index(departure.id), departure.box.pose.position_W.x(), departure.box.pose.position_W.y(), (int)to_index(found.id), found.box.pose.position_W.x(), found.box.pose.position_W.y()); fprintf(stderr, __VA_ARGS__); } } while (0)
@@ -95,7 +100,11 @@ std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const L
       starts.push_back(start);
     }
   }
-  std::optional<Pose> best;
+  // What may have come from farther away is told once nearer origins had time to show.
+  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  const bool settled =
+      now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns;
+  std::optional<Motion> best;
   double best_score = 0.0;
   bool enough = false;
   for (const Pose& start : starts) {
@@ -109,8 +118,9 @@ std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const L
     }
     moved_m /= static_cast<double>(departure.surfels.size());
     if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m) continue;
-    if (found.arrival != Arrival::kArrived && moved_m > kNearShare * longest_side(departure.box))
-      continue;
+    const double lengths = moved_m / longest_side(departure.box);
+    if (lengths > kNearShare && found.arrival != Arrival::kArrived) continue;
+    if (lengths > kAtOnceShare && !settled) continue;
     const Eigen::Isometry3f T = T_new_old.cast<float>();
     std::size_t empty = 0, seen = 0;
     for (const Surfel& s : departure.surfels) {
@@ -131,7 +141,7 @@ std::optional<Pose> ObjectTracker::motion_of(const Departure& departure, const L
     M("     score %.2f surfels %zu longest %.2f\n", score, surfels.size(), longest_side(departure.box));
     if (best && score <= best_score) continue;
     best_score = score;
-    best = T_new_old;
+    best = Motion{T_new_old, moved_m};
     enough = static_cast<double>(seen) >= kSeenShare * all;
   }
   return enough ? best : std::nullopt;
@@ -150,29 +160,30 @@ bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& objec
   return false;
 }
 
-void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
-  departure.evidence.rule = rule;
+LibraryObject* ObjectTracker::find_departed(const Step& step, const Departure& departure,
+                                            Motion& motion) {
   LibraryObject* best = nullptr;
-  Pose best_motion = Pose::Identity();
-  double best_m = 0.0;
+  const StampNs now_ns = step.frame.stamp_ns;
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   for (const ObjectId id :
-       library_.near(departure.box.pose.position_W,
-                     config_.state.relocation_reach_m + 0.5 * departure.box.size_m.head<2>().norm())) {
+       library_.near(departure.box.pose.position_W, config_.state.relocation_reach_m +
+                                                        departure.box.size_m.head<2>().norm())) {
     LibraryObject* other = library_.find(id);
-    const bool open = other->confirmed
-                          ? other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns
-                          : other->observations >= 2;
+    const bool open = other->confirmed ? other->added_ns && now_ns - *other->added_ns <= window_ns
+                                       : other->observations >= 2;
     if (!open || other->id == departure.part_of) continue;
-    const auto motion = motion_of(departure, *other);
-    if (!motion) continue;
-    const double distance_m =
-        (departure.box.pose.position_W - other->box.pose.position_W).head<2>().norm();
-    if (best && distance_m >= best_m) continue;
-    best = other, best_m = distance_m, best_motion = *motion;
+    const auto m = motion_of(departure, *other, now_ns);
+    if (!m || (best && m->length_m >= motion.length_m)) continue;
+    best = other, motion = *m;
   }
-  if (best) {
-    report_move(step, *best, departure, best_motion, rule);
+  return best;
+}
+
+void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
+  departure.evidence.rule = rule;
+  Motion motion;
+  if (LibraryObject* found = find_departed(step, departure, motion)) {
+    report_move(step, *found, departure, motion.T_new_old, rule);
     return;
   }
   ObjectEvent event;
@@ -192,21 +203,32 @@ void ObjectTracker::depart(Step& step, Departure departure, const std::string& r
 
 bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
   const Departure* best = nullptr;
-  Pose best_motion = Pose::Identity();
-  double best_m = 0.0;
+  Motion motion;
   for (const Departure& d :
        departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
-    const auto motion = motion_of(d, object);
-    if (!motion) continue;
-    const double distance_m =
-        (d.box.pose.position_W - object.box.pose.position_W).head<2>().norm();
-    if (best && distance_m >= best_m) continue;
-    best = &d, best_m = distance_m, best_motion = *motion;
+    const auto m = motion_of(d, object, step.frame.stamp_ns);
+    if (!m || (best && m->length_m >= motion.length_m)) continue;
+    best = &d, motion = *m;
   }
   if (!best) return false;
   const Departure from = *best;
-  report_move(step, object, from, best_motion, "found_again");
+  report_move(step, object, from, motion.T_new_old, "found_again");
   return true;
+}
+
+void ObjectTracker::find_far_moves(Step& step) {
+  const StampNs now_ns = step.frame.stamp_ns;
+  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  std::vector<Departure> due;
+  for (const Departure& d : departures_.recent(now_ns, config_.state.relocation_window_s)) {
+    if (!d.asked_far && now_ns - d.departed_ns >= wait_ns) due.push_back(d);
+  }
+  for (const Departure& d : due) {
+    departures_.set_asked_far(d.id);
+    Motion motion;
+    if (LibraryObject* found = find_departed(step, d, motion))
+      report_move(step, *found, d, motion.T_new_old, "found_again");
+  }
 }
 
 void ObjectTracker::confirm(Step& step, LibraryObject& object) {

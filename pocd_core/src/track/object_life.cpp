@@ -477,6 +477,7 @@ LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& fo
 }
 
 void ObjectTracker::report_changes(Step& step) {
+  find_far_moves(step);
   if (getenv("DBGM")) for (const auto& e : step.result.events) fprintf(stderr, "EV %d %s #%d (%.2f %.2f %.2f | %.2f %.2f %.2f yaw %.2f) %s abs %d vis %.2f thr %.2f from (%.2f %.2f)\n", (int)step.frame.sequence, e.kind == EventKind::kAdded ? "ADDED" : e.kind == EventKind::kMoved ? "MOVED" : e.kind == EventKind::kRemoved ? "REMOVED" : "UPDATED", (int)to_index(e.object), e.box.pose.position_W.x(), e.box.pose.position_W.y(), e.box.pose.position_W.z(), e.box.size_m.x(), e.box.size_m.y(), e.box.size_m.z(), e.box.pose.yaw_rad, e.evidence.rule.c_str(), e.absorbed ? (int)to_index(*e.absorbed) : 0, 0.0, 0.0, e.previous_box ? e.previous_box->pose.position_W.x() : 0.0, e.previous_box ? e.previous_box->pose.position_W.y() : 0.0);
   std::sort(changed_.begin(), changed_.end());
   changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());

@@ -87,7 +87,12 @@ class ObjectTracker {
   /// Whether a like object near by is being found gone: then the new one may be that one.
   bool origin_in_doubt(const Step& step, const LibraryObject& object);
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
-  std::optional<Pose> motion_of(const Departure& departure, const LibraryObject& found) const;
+  std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found,
+                                  StampNs now_ns) const;
+  /// The known or new object that is what departed, by the shortest motion; or null.
+  LibraryObject* find_departed(const Step& step, const Departure& departure, Motion& motion);
+  /// Once for each departure, when it is old enough for moves over a distance.
+  void find_far_moves(Step& step);
   void report_move(Step& step, LibraryObject& found, const Departure& from,
                    const Pose& T_new_old, const std::string& rule);
   void mark_changed(LibraryObject& object);

@@ -19,6 +19,13 @@ struct Departure {
   StampNs departed_ns = 0;  ///< found gone
   std::set<std::string> seen_by;
   Evidence evidence;
+  bool asked_far = false;  ///< objects at a distance were asked whether they are it
+};
+
+/// How a thing went from its old place to the new one.
+struct Motion {
+  Pose T_new_old = Pose::Identity();
+  double length_m = 0.0;  ///< mean over its points
 };
 
 /// Departures within a window of time, oldest first. Not thread-safe.
@@ -28,6 +35,7 @@ class Departures {
   /// Those within `window_s` before `now_ns`; older ones are forgotten. Valid until the next call.
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
   void forget(ObjectId id);
+  void set_asked_far(ObjectId id);
   /// Nothing that is kept happened after `latest_ns`.
   void set_clock_back(StampNs latest_ns);
 
