@@ -221,10 +221,10 @@ void ObjectTracker::find_far_moves(Step& step) {
   const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
   std::vector<Departure> due;
   for (const Departure& d : departures_.recent(now_ns, config_.state.relocation_window_s)) {
-    if (!d.asked_far && now_ns - d.departed_ns >= wait_ns) due.push_back(d);
+    if (now_ns - d.departed_ns >= (wait_ns << d.asked_far)) due.push_back(d);
   }
   for (const Departure& d : due) {
-    departures_.set_asked_far(d.id);
+    departures_.count_asked_far(d.id);
     Motion motion;
     if (LibraryObject* found = find_departed(step, d, motion))
       report_move(step, *found, d, motion.T_new_old, "found_again");

@@ -91,7 +91,7 @@ class ObjectTracker {
                                   StampNs now_ns) const;
   /// The known or new object that is what departed, by the shortest motion; or null.
   LibraryObject* find_departed(const Step& step, const Departure& departure, Motion& motion);
-  /// Once for each departure, when it is old enough for moves over a distance.
+  /// Looks for what departed at a distance: after kFarWaitS, twice that, and so on.
   void find_far_moves(Step& step);
   void report_move(Step& step, LibraryObject& found, const Departure& from,
                    const Pose& T_new_old, const std::string& rule);
