@@ -13,6 +13,9 @@ namespace {
 
 /// The new surface lies on the old one, moved, with at most this share beside it.
 constexpr double kOutlierShare = 0.2;
+/// With the known sides of it so far seen, so much may lie beside them: sides that were not known.
+constexpr double kWholeShare = 0.6;
+constexpr double kUnseenShare = 0.5;
 /// At most this share of the old surface, moved, lies where nothing is.
 constexpr double kEmptyShare = 0.15;
 /// At least this share of the old surface, moved, is seen at the new place.
@@ -109,7 +112,7 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const
   bool enough = false;
   for (const Pose& start : starts) {
     const IcpResult icp = point_to_plane_icp(target, source, options, start);
-    if (icp.dissimilarity > kOutlierShare) continue;
+    if (icp.dissimilarity > kUnseenShare) continue;
     const Pose T_new_old = icp.T_target_source.inverse();
     double moved_m = 0.0;  // of its points: what turns in place moves, too
     for (const Surfel& s : departure.surfels) {
@@ -134,6 +137,8 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const
     const auto all = static_cast<double>(departure.surfels.size());
     M("  empty %zu seen %zu all %zu moved %.2f dissimilar %.2f\n", empty, seen, departure.surfels.size(), moved_m, icp.dissimilarity);
     if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty)) continue;
+    // New sides may show when all of the known ones do.
+    if (icp.dissimilarity > kOutlierShare && static_cast<double>(seen) < kWholeShare * all) continue;
     // Of motions that explain the same, the shortest: the sides of a box are alike.
     const double contradicted = static_cast<double>(empty) / static_cast<double>(seen + empty);
     const double score = 1.0 - icp.dissimilarity - contradicted -
@@ -277,7 +282,12 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   found.changed = false;  // it was listed under its old id
   mark_changed(found);
   ObjectEvent& event = add_event(step, EventKind::kMoved, found, rule);
-  event.previous_box = from.box;
+  // Where all that is known of it was; of what departed, only a part may have been known.
+  OrientedBox before = found.box;
+  before.pose.position_W = T_new_old.inverse() * before.pose.position_W;
+  const Eigen::Matrix3d& R = T_new_old.linear();
+  before.pose.yaw_rad -= std::atan2(R(1, 0), R(0, 0));
+  event.previous_box = before;
   event.absorbed = absorbed;
   event.evidence = from.evidence;
   event.evidence.rule = rule;
