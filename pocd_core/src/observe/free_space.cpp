@@ -31,11 +31,12 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
   const Eigen::Matrix3f R = T_C_W.linear().cast<float>();
   std::array<Eigen::Vector3f, kCells> offset;  // of the cells' centres from the block's corner [C]
   for (int i = 0; i < kCells; ++i) {
-    offset[i] = R * (Eigen::Vector3f(static_cast<float>(i & 7), static_cast<float>(i >> 3 & 7),
-                                     static_cast<float>(i >> 6))
-                         .array() +
-                     0.5f)
-                        .matrix() *
+    offset[i] = R *
+                (Eigen::Vector3f(static_cast<float>(i & 7), static_cast<float>(i >> 3 & 7),
+                                 static_cast<float>(i >> 6))
+                     .array() +
+                 0.5f)
+                    .matrix() *
                 static_cast<float>(cell_m_);
   }
   // Corners of the view, in the world.

@@ -2,15 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "pocd/association/associate.hpp"
 
 namespace pocd {
 namespace {
-int DBGID() { static int id = getenv("DBG") ? atoi(getenv("DBG")) : -1; return id; }
-#define D(...) do { if ((int)to_index(look.object->id) == DBGID()) fprintf(stderr, __VA_ARGS__); } while (0)
 
 /// Fewer points than this say nothing.
 constexpr int kLeastPoints = 5;
@@ -24,13 +20,11 @@ constexpr double kDoubtfulShare = 0.1;
 constexpr double kFittingShare = 0.75;
 /// A like surface that is nearer than this share of the thing's size leaves no room for two.
 constexpr double kTakenShare = 0.5;
-/// So much of a thing must be measured at a new place that only covers the old one.
-constexpr double kCoveringShare = 0.5;
 constexpr std::size_t kFitBudget = 200;
 /// Points of a surface lie within so many spacings of a surfel, beside their noise.
 constexpr double kFitSpacings = 0.75;
-/// The surface at its new place explains the frame when no more than this share of it is seen through,
-/// and it is measured in at least so many points as this share of what was measured there.
+/// The surface at its new place explains the frame when no more than this share of it is seen
+/// through, and it is measured in at least so many points as this share of what was measured there.
 constexpr double kLeftOverShare = 0.15;
 constexpr double kExplainedShare = 0.6;
 /// At most this share of what was measured may lie on sides that were not known.
@@ -154,8 +148,6 @@ void judge(const OrganizedCloud& cloud, const DepthField& field, const Observati
   } else {
     look.verdict = Verdict::kInPlace;
   }
-  D("judge %d total %d here %d through %d covered %d occ %d contested %d fits %d -> %s\n", (int)to_index(object.id), s.total, tally.here, tally.through, tally.covered, s.occluded, look.contested, look.fits, to_string(look.verdict));
-  if (look.contested) for (const auto& t : s.touches) D("     touch obs %d class %d hit %d front %d size %zu\n", t.observation, (int)observations.list[t.observation].class_id, t.hit, t.in_front, observations.list[t.observation].points.size());
 }
 
 void align(const OrganizedCloud& cloud, const DepthField& field, const Observations& observations,
@@ -178,15 +170,15 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     });
     if (!of_another) around.points.push_back(p);
   }
-  D("  around %zu of %zu\n", around.points.size(), observations.list[look.observation].points.size());
   if (around.points.size() < static_cast<std::size_t>(2 * kLeastPoints)) return;
   const Tally before = tally_of(look.sighting, observations, object.class_id, look.observation);
-  // Its old place must be seen empty in part, and enough of it be seen to tell.
+  // Enough of its old place must be seen to tell.
   const int told = before.here + before.through + before.covered;
   if (told < 2 * kLeastPoints) return;
 
   // A wall says nothing of how far it slid along itself: each end may be the one that is seen.
-  const double yaw = object.box.pose.yaw_rad + (object.box.size_m.x() < object.box.size_m.y() ? M_PI_2 : 0.0);
+  const double yaw =
+      object.box.pose.yaw_rad + (object.box.size_m.x() < object.box.size_m.y() ? M_PI_2 : 0.0);
   const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
   double low = 1e9, high = -1e9;
   for (const SurfacePoint& p : around.points) {
@@ -204,7 +196,6 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     Pose start = Pose::Identity();
     start.translation() = -slid_m * along_W;
     const auto match = align_in_place(object, around, cloud.T_W_C, start, loose);
-    D("   slid %.2f match %d disp %.3f\n", slid_m, (int)match.has_value(), match ? match->displacement_m : 0.0);
     if (!match || match->displacement_m < least_m || match->displacement_m > config.max_distance_m)
       continue;
     // An edge that fits says nothing of where the rest went.
@@ -226,9 +217,9 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     sight_object(moved, object.class_id, min_hits(object), cloud, field, observations, sight, noise,
                  there);
     const Tally after = tally_of(there, observations, object.class_id, look.observation);
-    D("   through %d here %d before %d around %zu\n", after.through, after.here, before.here, around.points.size());
     const int in_view = after.here + after.through + there.occluded + there.unknown;
-    if (after.here < kCoveringShare * in_view || after.here < 0.1 * there.total) continue;
+    if (after.here < kMajority * in_view || after.here < config.min_visible_share * there.total)
+      continue;
     if (after.through > kLeftOverShare * (after.here + after.through) || after.here < before.here ||
         after.here < kExplainedShare * static_cast<double>(around.points.size()) ||
         after.here - after.through <= most) {

@@ -19,8 +19,8 @@ constexpr double kOverlapShare = 0.3;
 constexpr std::size_t kContactBudget = 60;
 constexpr int kLeastContacts = 2;
 
-/// Connected pieces of some points of an observation, of which there is one per cell of `spacing_m`:
-/// points nearer than `reach_m` belong together.
+/// Connected pieces of some points of an observation, of which there is one per cell of
+/// `spacing_m`: points nearer than `reach_m` belong together.
 std::vector<std::vector<std::int32_t>> pieces_of(const std::vector<SurfacePoint>& points,
                                                  const std::vector<std::int32_t>& indices,
                                                  double spacing_m, double reach_m) {
@@ -158,8 +158,8 @@ class Divider {
     }
   }
 
-  void explain(std::int32_t index, const Observation& observation,
-               std::vector<std::int32_t>& rest, std::vector<Part>& parts) {
+  void explain(std::int32_t index, const Observation& observation, std::vector<std::int32_t>& rest,
+               std::vector<Part>& parts) {
     const auto radius = static_cast<float>(1.5 * config_.spacing_m);
     std::vector<std::vector<std::int32_t>> own(owners_.size());
     for (std::size_t i = 0; i < observation.points.size(); ++i) {
@@ -220,7 +220,8 @@ class Divider {
       const int count = contacts(piece, points, *owner.look);
       if (count <= most) continue;
       beside_contested |= owner.look->contested;
-      if (owner.look->contested || owner.look->verdict == Verdict::kUnobserved || (arrived && owner.look->object->arrival != Arrival::kArrived))
+      if (owner.look->contested || owner.look->verdict == Verdict::kUnobserved ||
+          (arrived && owner.look->object->arrival != Arrival::kArrived))
         continue;
       most = count;
       best = owner.look;

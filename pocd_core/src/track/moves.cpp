@@ -2,8 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "pocd/association/point_to_plane_icp.hpp"
 #include "tracker_step.hpp"
@@ -46,24 +44,18 @@ bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) 
 
 }  // namespace
 
-std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const LibraryObject& found,
-                                               StampNs now_ns) const {
+std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
+                                               const LibraryObject& found, StampNs now_ns) const {
   if (departure.class_id != found.class_id || departure.id == found.id) return std::nullopt;
-  static const bool dbg = getenv("DBGM");
-#define M(...) do { if (dbg) { fprintf(stderr, "dep %d(%.2f %.2f) found %d(%.2f %.2f): ", (int)to_index(departure.id), departure.box.pose.position_W.x(), departure.box.pose.position_W.y(), (int)to_index(found.id), found.box.pose.position_W.x(), found.box.pose.position_W.y()); fprintf(stderr, __VA_ARGS__); } } while (0)
-  if (departure.in_place_ns > found.first_seen_ns) M("in place %.2f s after first seen\n", (departure.in_place_ns - found.first_seen_ns) * 1e-9);
   // What was seen in its place when the new one was there, too, is another thing.
   if (departure.in_place_ns > found.first_seen_ns) return std::nullopt;
   const double slack_m = 3.0 * config_.map.voxel_size_m;
   const double distance_m =
       (departure.box.pose.position_W - found.box.pose.position_W).head<2>().norm();
-  if (distance_m > config_.state.relocation_reach_m) M("distance %.2f\n", distance_m);
   // Of each only a part may be known: how far it went is told by the alignment.
-  const double parts_m = 0.5 * (departure.box.size_m.head<2>().norm() + found.box.size_m.head<2>().norm());
+  const double parts_m =
+      0.5 * (departure.box.size_m.head<2>().norm() + found.box.size_m.head<2>().norm());
   if (distance_m > config_.state.relocation_reach_m + parts_m) return std::nullopt;
-  if (distance_m < 0.5 * config_.change.tau_m) M("too near %.2f\n", distance_m);
-  if (found.arrival != Arrival::kArrived && distance_m > kNearShare * longest_side(departure.box)) M("not arrived %d distance %.2f of %.2f\n", (int)found.arrival, distance_m, longest_side(departure.box));
-  if (!may_be(found.box, departure.box, slack_m)) M("may not be: found %.2f %.2f %.2f departed %.2f %.2f %.2f\n", found.box.size_m.x(), found.box.size_m.y(), found.box.size_m.z(), departure.box.size_m.x(), departure.box.size_m.y(), departure.box.size_m.z());
   if (!may_be(found.box, departure.box, slack_m)) return std::nullopt;
 
   Points points, normals, source;
@@ -80,8 +72,8 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const
   IcpOptions options;
   options.max_iterations = config_.association.icp_iterations;
   options.robust_scale_m = config_.map.voxel_size_m;
-  // As it stands, and with the boxes' sides along each other; by the middles, and, for of each only a
-  // part may be known, by either end.
+  // As it stands, and with the boxes' sides along each other; by the middles, and, for of each only
+  // a part may be known, by either end.
   std::vector<Pose> starts{Pose::Identity()};
   const double turn_rad = departure.box.pose.yaw_rad - found.box.pose.yaw_rad;
   const auto along_of = [](const OrientedBox& box) {
@@ -120,7 +112,8 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const
       moved_m += (T_new_old * p - p).norm();
     }
     moved_m /= static_cast<double>(departure.surfels.size());
-    if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m) continue;
+    if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
+      continue;
     const double lengths = moved_m / longest_side(departure.box);
     if (lengths > kNearShare && found.arrival != Arrival::kArrived) continue;
     if (lengths > kAtOnceShare && !settled) continue;
@@ -135,15 +128,14 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure, const
       }
     }
     const auto all = static_cast<double>(departure.surfels.size());
-    M("  empty %zu seen %zu all %zu moved %.2f dissimilar %.2f\n", empty, seen, departure.surfels.size(), moved_m, icp.dissimilarity);
     if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty)) continue;
     // New sides may show when all of the known ones do.
-    if (icp.dissimilarity > kOutlierShare && static_cast<double>(seen) < kWholeShare * all) continue;
+    if (icp.dissimilarity > kOutlierShare && static_cast<double>(seen) < kWholeShare * all)
+      continue;
     // Of motions that explain the same, the shortest: the sides of a box are alike.
     const double contradicted = static_cast<double>(empty) / static_cast<double>(seen + empty);
-    const double score = 1.0 - icp.dissimilarity - contradicted -
-                         kShortness * moved_m / longest_side(departure.box);
-    M("     score %.2f surfels %zu longest %.2f\n", score, surfels.size(), longest_side(departure.box));
+    const double score =
+        1.0 - icp.dissimilarity - contradicted - kShortness * moved_m / longest_side(departure.box);
     if (best && score <= best_score) continue;
     best_score = score;
     best = Motion{T_new_old, moved_m};
@@ -171,8 +163,8 @@ LibraryObject* ObjectTracker::find_departed(const Step& step, const Departure& d
   const StampNs now_ns = step.frame.stamp_ns;
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   for (const ObjectId id :
-       library_.near(departure.box.pose.position_W, config_.state.relocation_reach_m +
-                                                        departure.box.size_m.head<2>().norm())) {
+       library_.near(departure.box.pose.position_W,
+                     config_.state.relocation_reach_m + departure.box.size_m.head<2>().norm())) {
     LibraryObject* other = library_.find(id);
     const bool open = other->confirmed ? other->added_ns && now_ns - *other->added_ns <= window_ns
                                        : other->observations >= 2;
@@ -247,7 +239,7 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
 }
 
 void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departure& from,
-                                const Pose& T_new_old,                                const std::string& rule) {
+                                const Pose& T_new_old, const std::string& rule) {
   const std::optional<ObjectId> absorbed =
       found.confirmed ? std::make_optional(found.id) : std::nullopt;
   const ObjectId old = found.id;

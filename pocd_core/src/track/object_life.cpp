@@ -164,7 +164,8 @@ void ObjectTracker::join_objects(Step& step) {
       const auto count = x.companions.find(y.id);
       if (!one_piece || apart) {
         // Once seen as two, they have to be seen as one for as long again.
-        const bool both = look_a.sighting.hit >= kSharedPoints && look_b.sighting.hit >= kSharedPoints;
+        const bool both =
+            look_a.sighting.hit >= kSharedPoints && look_b.sighting.hit >= kSharedPoints;
         if (both && count != x.companions.end() && --count->second <= 0) x.companions.erase(count);
         continue;
       }
@@ -172,7 +173,6 @@ void ObjectTracker::join_objects(Step& step) {
         joined.emplace_back(x.id, y.id);
         continue;
       }
-      if (getenv("DBGM")) fprintf(stderr, "J frame %d: %d %d looks %d connected %d boxes x %.2f+-%.2f y %.2f+-%.2f, x %.2f+-%.2f y %.2f+-%.2f\n", (int)step.frame.sequence, (int)to_index(x.id), (int)to_index(y.id), x.companions[y.id], connected(x, y), x.box.pose.position_W.x(), x.box.size_m.x()/2, x.box.pose.position_W.y(), x.box.size_m.y()/2, y.box.pose.position_W.x(), y.box.size_m.x()/2, y.box.pose.position_W.y(), y.box.size_m.y()/2);
       int& looks = x.companions[y.id];
       if (++looks < enough) continue;
       looks = 0;
@@ -234,7 +234,8 @@ void ObjectTracker::lose_surface(Step& step) {
       surfels[i].seen_through = 0;
       surfels[i].last_hit_ns = step.frame.stamp_ns;
     }
-    if (frames == 0 || look.verdict == Verdict::kUnobserved || look.verdict == Verdict::kDisplaced) {
+    if (frames == 0 || look.verdict == Verdict::kUnobserved ||
+        look.verdict == Verdict::kDisplaced) {
       continue;
     }
     for (const Surfel& s : surfels) {
@@ -268,9 +269,8 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
     if (looks_[n].object == &object) looks_[n].sighting.sights.clear();
   }
   if (!object.model.surfels().empty()) refit_box(step, object);
-  const bool is_part =
-      object.confirmed && piece >= 2 * least_surfels() &&
-      static_cast<double>(piece) >= kPartShare * static_cast<double>(before);
+  const bool is_part = object.confirmed && piece >= 2 * least_surfels() &&
+                       static_cast<double>(piece) >= kPartShare * static_cast<double>(before);
   if (!is_part) return;
   const IcpTarget gone = [&] {
     Points points, normals;
@@ -303,7 +303,8 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
   // When most of it was still there: a few points lie on what came after it.
   std::vector<StampNs> hits;
   for (const Surfel& s : departure.surfels) hits.push_back(s.last_hit_ns);
-  std::nth_element(hits.begin(), hits.begin() + static_cast<std::ptrdiff_t>(hits.size() / 2), hits.end());
+  std::nth_element(hits.begin(), hits.begin() + static_cast<std::ptrdiff_t>(hits.size() / 2),
+                   hits.end());
   departure.in_place_ns = hits[hits.size() / 2];
   departure.departed_ns = step.frame.stamp_ns;
   departure.seen_by = object.seen_by;
@@ -478,7 +479,6 @@ LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& fo
 
 void ObjectTracker::report_changes(Step& step) {
   find_far_moves(step);
-  if (getenv("DBGM")) for (const auto& e : step.result.events) fprintf(stderr, "EV %d %s #%d (%.2f %.2f %.2f | %.2f %.2f %.2f yaw %.2f) %s abs %d vis %.2f thr %.2f from (%.2f %.2f)\n", (int)step.frame.sequence, e.kind == EventKind::kAdded ? "ADDED" : e.kind == EventKind::kMoved ? "MOVED" : e.kind == EventKind::kRemoved ? "REMOVED" : "UPDATED", (int)to_index(e.object), e.box.pose.position_W.x(), e.box.pose.position_W.y(), e.box.pose.position_W.z(), e.box.size_m.x(), e.box.size_m.y(), e.box.size_m.z(), e.box.pose.yaw_rad, e.evidence.rule.c_str(), e.absorbed ? (int)to_index(*e.absorbed) : 0, 0.0, 0.0, e.previous_box ? e.previous_box->pose.position_W.x() : 0.0, e.previous_box ? e.previous_box->pose.position_W.y() : 0.0);
   std::sort(changed_.begin(), changed_.end());
   changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
   const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "pocd/change/geometric_change.hpp"
-#include "pocd/state/lifecycle.hpp"
 #include "pocd/common/cell_index.hpp"
+#include "pocd/state/lifecycle.hpp"
 
 namespace pocd {
 namespace {
@@ -41,7 +41,8 @@ void paint(const Observations& observations, const std::vector<Part>& parts,
     std::size_t most = 0, points = 0;
     for (const std::size_t p : o.parts) {
       points += parts[p].points.size();
-      if (parts[p].points.size() > most) most = parts[p].points.size(), o.main = to_index(owners[p]);
+      if (parts[p].points.size() > most)
+        most = parts[p].points.size(), o.main = to_index(owners[p]);
     }
     o.one = points == observations.list[j].points.size() &&
             std::all_of(o.parts.begin(), o.parts.end(),
@@ -78,8 +79,8 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                            TsdfMap& map, std::vector<std::uint32_t>& owner_of_pixel,
                            FrameResult& result) {
   Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}};
-  step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m,
-                config_.map.max_depth_m, config_.association.icp_max_distance_m};
+  step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m, config_.map.max_depth_m,
+                config_.association.icp_max_distance_m};
   look_at_objects(step);
   update_beliefs(step);
   fuse_parts(step);
@@ -131,8 +132,9 @@ void ObjectTracker::look_at_objects(Step& step) {
   parts.spacing_m = config_.map.voxel_size_m;
   parts.contact_m = config_.segmentation.cluster_tolerance_m;
   parts.least_points = std::max<std::size_t>(10, least_surfels());
-  step.parts = divide(step.observations, looks_.data(), step.look_count,
-                      [&](const Eigen::Vector3f& p) { return seen_empty(step.map, p); }, parts);
+  step.parts = divide(
+      step.observations, looks_.data(), step.look_count,
+      [&](const Eigen::Vector3f& p) { return seen_empty(step.map, p); }, parts);
 }
 
 void ObjectTracker::update_beliefs(Step& step) {

@@ -74,8 +74,8 @@ class ObjectTracker {
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
                  const std::string& rule);
-  /// Clears the object's voxels where `inside` says so, but for those at which this frame or another
-  /// object has a surface.
+  /// Clears the object's voxels where `inside` says so, but for those at which this frame or
+  /// another object has a surface.
   void clear_gone(Step& step, ObjectId id,
                   const std::function<bool(const Eigen::Vector3d&)>& inside);
   void remove(Step& step, LibraryObject& object, const std::string& rule);
@@ -93,8 +93,8 @@ class ObjectTracker {
   LibraryObject* find_departed(const Step& step, const Departure& departure, Motion& motion);
   /// Looks for what departed at a distance: after kFarWaitS, twice that, and so on.
   void find_far_moves(Step& step);
-  void report_move(Step& step, LibraryObject& found, const Departure& from,
-                   const Pose& T_new_old, const std::string& rule);
+  void report_move(Step& step, LibraryObject& found, const Departure& from, const Pose& T_new_old,
+                   const std::string& rule);
   void mark_changed(LibraryObject& object);
   Evidence evidence_of(const Step& step, const LibraryObject& object) const;
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,

@@ -54,7 +54,7 @@ TEST(ShippedConfigs, TorwicHasThePublishedParameters) {
   EXPECT_EQ(c.map.max_depth_m, 3.0);
   EXPECT_EQ(c.association.max_distance_m, 0.9);
   EXPECT_EQ(c.association.max_dissimilarity, 0.10);
-  EXPECT_EQ(c.association.min_visible_share, 0.20);
+  EXPECT_EQ(c.association.min_visible_share, 0.10);
   EXPECT_EQ(c.change.delta_max_m, 4.0);
   EXPECT_EQ(c.change.tau_m, 0.20);
   EXPECT_EQ(c.state.remove_below, 0.4);

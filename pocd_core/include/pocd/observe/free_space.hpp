@@ -26,8 +26,8 @@ class FreeSpace {
   void update(const OrganizedCloud& cloud, const DepthField& field, const DepthNoise& noise,
               double max_depth_m, double pose_tolerance_m);
 
-  /// Whether at least `kLooks` looks saw the cell of the point empty, and nothing was measured there
-  /// since.
+  /// Whether at least `kLooks` looks saw the cell of the point empty, and nothing was measured
+  /// there since.
   bool seen_empty(const Eigen::Vector3f& point_W) const;
   static constexpr int kLooks = 3;
 

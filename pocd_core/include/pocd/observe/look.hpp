@@ -49,9 +49,9 @@ void judge(const OrganizedCloud& cloud, const DepthField& field, const Observati
 
 /// For an object whose place is contested: aligns what was measured around it with its surface
 /// (point-to-plane ICP). When the surface, moved so, explains the frame, the verdict becomes
-/// kDisplaced. The old place must be seen empty in part, or be taken by the new one: two solid things
-/// are not in one place. `least_m`: shorter motions are noise [m]. `looks`: the frame's, judged; what
-/// lies on other objects in their places is not aligned.
+/// kDisplaced. The old place must be seen empty in part, or be taken by the new one: two solid
+/// things are not in one place. `least_m`: shorter motions are noise [m]. `looks`: the frame's,
+/// judged; what lies on other objects in their places is not aligned.
 void align(const OrganizedCloud& cloud, const DepthField& field, const Observations& observations,
            const SightConfig& sight, const DepthNoise& noise, const AssociationConfig& config,
            double least_m, const Look* looks, std::size_t count, Look& look);

@@ -23,17 +23,17 @@ struct Part {
 using SeenEmpty = std::function<bool(const Eigen::Vector3f&)>;
 
 struct PartsConfig {
-  double spacing_m = 0.05;          ///< of surfels and of the observations' points
-  double contact_m = 0.10;          ///< pieces of surface nearer than this touch each other
-  std::size_t least_points = 10;    ///< a smaller new piece beside known surface is noise
+  double spacing_m = 0.05;        ///< of surfels and of the observations' points
+  double contact_m = 0.10;        ///< pieces of surface nearer than this touch each other
+  std::size_t least_points = 10;  ///< a smaller new piece beside known surface is noise
 };
 
 /// Divides the observations among the objects that were looked at. A point near an object's surface
-/// is explained by it. The others fall into connected pieces. A piece of which a good part lies where
-/// nothing was before belongs to an object that arrived and that it touches, or is something new;
-/// another one belongs to the object in place that it touches, or is something new.
-/// Objects and observations belong together only if classes agree and, where masks carry
-/// instances, no object is in two of them.
+/// is explained by it. The others fall into connected pieces. A piece of which a good part lies
+/// where nothing was before belongs to an object that arrived and that it touches, or is something
+/// new; another one belongs to the object in place that it touches, or is something new. Objects
+/// and observations belong together only if classes agree and, where masks carry instances, no
+/// object is in two of them.
 std::vector<Part> divide(const Observations& observations, Look* looks, std::size_t count,
                          const SeenEmpty& seen_empty, const PartsConfig& config);
 
