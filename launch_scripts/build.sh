@@ -1,25 +1,40 @@
 #!/usr/bin/env bash
-# Builds the workspace with colcon into build/ and install/ (one merged prefix, Release).
+# Builds the workspace with colcon into build/ and install/ (one merged prefix, Release), or, with a
+# sanitizer, into build/thread and install/thread or build/address and install/address.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 usage() {
   cat <<'TEXT'
-usage: build.sh [--core] [--tests] [--werror] [-- CMAKE_ARGUMENT...]
-  --core     only pocd_core (library, pocd_map, pocd_parameters): needs no Fast DDS
-  --tests    also the tests and benchmarks
-  --werror   warnings are errors
+usage: build.sh [--core] [--tests] [--werror] [--sanitize thread|address] [-- CMAKE_ARGUMENT...]
+  --core      only pocd_core (library, pocd_map, pocd_parameters): needs no Fast DDS
+  --tests     also the tests and benchmarks
+  --werror    warnings are errors
+  --sanitize  thread: ThreadSanitizer; address: AddressSanitizer and UndefinedBehaviorSanitizer
 example: build.sh --tests -- -DCMAKE_BUILD_TYPE=Debug
 TEXT
 }
 
 selection=(--packages-skip pocd_test)
 werror=OFF
+base=() sanitizer=()
 while [[ $# -gt 0 ]]; do
   case "$1" in
     --core) selection=(--packages-select pocd_core) ;;
     --tests) selection=() ;;
     --werror) werror=ON ;;
+    --sanitize)
+      shift
+      flags="-g1 -fno-omit-frame-pointer"
+      case "${1:-}" in
+        thread) flags+=" -fsanitize=thread" ;;
+        address) flags+=" -fsanitize=address,undefined -fno-sanitize-recover=undefined" ;;
+        *) usage >&2 && exit 2 ;;
+      esac
+      base=(--build-base "build/$1" --install-base "install/$1")
+      sanitizer=("-DCMAKE_CXX_FLAGS=$flags" "-DCMAKE_C_FLAGS=$flags" "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG"
+        -DPOCD_BENCHMARKS=OFF)
+      ;;
     --help | -h) usage && exit 0 ;;
     --) shift && break ;;
     *) usage >&2 && exit 2 ;;
@@ -35,8 +50,8 @@ jobs=$(nproc)
 
 # MAKEFLAGS keeps colcon from adding a limit by load average, which on a busy machine means one job.
 export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs MAKEFLAGS="-j$jobs"
-if ! colcon --log-level error build --merge-install --executor sequential "${selection[@]}" \
-  --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "$@"; then
+if ! colcon --log-level error build --merge-install --executor sequential "${base[@]}" "${selection[@]}" \
+  --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "${sanitizer[@]}" "$@"; then
   # Ninja reports compiler errors on stdout, which colcon keeps in a file.
   failed=$(ls -t log/latest_build/*/stdout_stderr.log 2>/dev/null | head -n 1)
   if [[ -n "$failed" ]]; then

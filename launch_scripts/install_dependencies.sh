@@ -9,13 +9,16 @@ packages=(
   python3-colcon-package-selection python3-colcon-output python3-colcon-parallel-executor
   # bus; fastddsgen runs on Java but does not depend on it
   fastddsgen default-jre-headless fastdds-tools libfastrtps-dev libfastcdr-dev
+  libsystemd-dev pkg-config
+  # packages and their man pages
+  dpkg-dev help2man
   # core
   libeigen3-dev libpcl-dev libopencv-dev libyaml-cpp-dev libspdlog-dev libcli11-dev libdlib-dev
   libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
   # simulator: rays on meshes
   libembree-dev
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev iproute2 iptables
+  libgtest-dev libbenchmark-dev iproute2 iptables openssl
   cyclonedds-dev cyclonedds-tools tshark
 )
 

@@ -1,31 +1,59 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds everything and runs every test. The last line is
 # "N passed, N failed" (and ", N skipped"); the exit code is 0 only when tests ran and none failed.
+#
+# With --sanitize thread, the tests of the component's threads run under ThreadSanitizer; with --sanitize
+# address, all tests under AddressSanitizer and UndefinedBehaviorSanitizer. Only what --only selects is built.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 build_arguments=(--tests)
 ctest_arguments=()
+sanitizer="" only="" werror=""
 while [[ $# -gt 0 ]]; do
   case "$1" in
-    --werror) build_arguments+=(--werror) ;;
-    --only) shift && ctest_arguments+=(--tests-regex "${1:?--only needs a pattern}") ;;
+    --werror) werror=--werror ;;
+    --only) shift && only=${1:?--only needs a pattern} ;;
+    --sanitize) shift && sanitizer=${1:?--sanitize needs thread or address} ;;
     *)
-      echo "usage: test.sh [--werror] [--only PATTERN]   (PATTERN: regular expression of names)" >&2
+      echo "usage: test.sh [--werror] [--only PATTERN] [--sanitize thread|address]" >&2
+      echo "  PATTERN: regular expression of names" >&2
       exit 2
       ;;
   esac
   shift
 done
 
+build=build base=()
+case "$sanitizer" in
+  "") build_arguments+=(${werror:+"$werror"}) ;;
+  thread)
+    # Everything that has threads of its own.
+    only=${only:-'^(unit_(common|mirror|node)|integration_(fleet|health|library_guards|many_robots|map_bus|mirror|node|two_nodes|type_versions))$'}
+    ;;
+  address) ;;
+  *) echo "test.sh: --sanitize $sanitizer, expected thread or address" >&2 && exit 2 ;;
+esac
+[[ -n "$only" ]] && ctest_arguments+=(--tests-regex "$only")
+if [[ -n "$sanitizer" ]]; then
+  build=build/$sanitizer
+  base=(--build-base "$build" --install-base "install/$sanitizer")
+  build_arguments+=(--sanitize "$sanitizer" -- "-DPOCD_TEST_SELECT=$only" -DPOCD_TEST_TIMEOUT=2400)
+  rules=$PWD/test/support/sanitizers
+  # A report ends the process with an exit code that no test takes for success.
+  export TSAN_OPTIONS="suppressions=$rules/thread.supp exitcode=66 second_deadlock_stack=1"
+  export ASAN_OPTIONS="exitcode=66 detect_stack_use_after_return=1" UBSAN_OPTIONS="print_stacktrace=1"
+  export LSAN_OPTIONS="suppressions=$rules/leak.supp print_suppressions=0"
+fi
+
 launch_scripts/install_dependencies.sh
 launch_scripts/build.sh "${build_arguments[@]}"
 
 # Google tests write one report each into gtest/; ctest writes Test.xml about all executables.
-results=build/pocd_test
+results=$build/pocd_test
 rm -rf "$results/gtest" "$results/Testing"
 status=0
-colcon --log-level error test --merge-install --packages-select pocd_test \
+colcon --log-level error test --merge-install "${base[@]}" --packages-select pocd_test \
   --event-handlers console_direct+ --return-code-on-test-failure \
   --ctest-args --output-on-failure --parallel "$(nproc)" "${ctest_arguments[@]}" || status=$?
 

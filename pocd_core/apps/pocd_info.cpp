@@ -6,7 +6,7 @@
 #include <iostream>
 
 #include "pocd/common/check.hpp"
-#include "pocd/recording/mcap_reader.hpp"
+#include "pocd/recording/recording_files.hpp"
 
 namespace {
 

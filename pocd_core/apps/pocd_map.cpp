@@ -9,6 +9,7 @@
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/config/node_config.hpp"
 
 namespace {
 
@@ -42,13 +43,17 @@ int main(int argc, char** argv) {
       "pocd_map");
   pocd::MapRunOptions options;
   std::vector<std::filesystem::path> files;
-  std::vector<std::string> overrides;
+  std::vector<std::string> overrides, robots;
   app.set_version_flag("--version", POCD_VERSION);
   pocd::add_dataset_options(app, options.dataset);
+  pocd::add_topic_options(app, overrides);
   app.add_option("--config", files, "Configuration file; repeat it to overlay several")
       ->required()
       ->allow_extra_args(false);
   app.add_option("--set", overrides, "Override one parameter: GROUP.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--robot", robots,
+                 "A robot of a recording, as for pocd_node; default: all; repeat it")
       ->allow_extra_args(false);
   app.add_option_function<std::string>(
       "--threads", [&](const std::string& n) { overrides.push_back("threads=" + n); },
@@ -62,7 +67,11 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   try {
-    pocd::load_config(options.config, files, overrides);
+    pocd::NodeFile file;
+    pocd::load_config(file, files, overrides);
+    file.node.set_robots(robots);
+    options.config = file.pipeline;
+    options.dataset.input = file.node;
   } catch (const pocd::InputError& error) {
     std::cerr << "pocd_map: " << error.what() << '\n';
     return 2;
@@ -73,6 +82,7 @@ int main(int argc, char** argv) {
     options.show_progress = isatty(STDERR_FILENO) != 0;
     options.dataset.label_divisor = options.config.classes.label_divisor;
     options.dataset.classes = options.config.classes;
+    options.dataset.max_depth_m = options.config.map.max_depth_m;
     print(pocd::run_map(options, std::cerr), options.output);
     return std::cout.flush() ? 0 : 1;
   } catch (const std::exception& error) {

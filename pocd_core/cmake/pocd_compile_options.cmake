@@ -3,8 +3,12 @@
 # runtime-dispatched versions (POCD_KERNEL in pocd/common/kernel.hpp).
 option(POCD_WERROR "Treat warnings as errors (continuous integration)" OFF)
 function(pocd_compile_options target)
+  set(optimisation -O3)
+  if(CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+    set(optimisation -O1)  # what is looked for is in the source, and the build takes half the time
+  endif()
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wno-sign-conversion
-    -O3 -ffp-contract=off $<$<BOOL:${POCD_WERROR}>:-Werror>)
+    ${optimisation} -ffp-contract=off $<$<BOOL:${POCD_WERROR}>:-Werror>)
   if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
     target_compile_options(${target} PRIVATE -march=x86-64-v2)
   endif()

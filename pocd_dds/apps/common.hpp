@@ -1,7 +1,6 @@
 // What the commands on the bus have in common: signals, logging, bus options.
 #pragma once
 
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +10,7 @@
 #include <iostream>
 #include <string>
 
+#include "apps/logging.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/participant.hpp"
 
@@ -34,21 +34,20 @@ inline void stop_on_signals() {
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
 }
 
-/// Messages go to stderr; stdout belongs to results.
-inline void log_to_stderr(const std::string& program) {
-  auto logger = spdlog::stderr_color_mt(program);
-  logger->set_pattern("[%H:%M:%S.%e] %n: %^%l%$: %v");
-  spdlog::set_default_logger(logger);
-}
-
-/// Adds --domain and --profiles.
-inline void add_bus_options(CLI::App& app, int& domain, std::string& profiles_file) {
+/// Adds --domain, --profiles and --security, and the options of the log.
+inline void add_bus_options(CLI::App& app, int& domain, std::string& profiles_file,
+                            std::string& security_folder) {
   app.add_option("--domain", domain, "DDS domain; default: ROS_DOMAIN_ID, or 0")
       ->check(CLI::Range(0, 232));
   app.add_option("--profiles", profiles_file,
                  "Fast DDS XML profiles: a default participant profile, or profiles named like a "
                  "topic, replace the built-in settings")
       ->check(CLI::ExistingFile);
+  app.add_option("--security", security_folder,
+                 "Folder with identity and permissions (docs/security.md): talk to nobody without")
+      ->envname("POCD_SECURITY")
+      ->check(CLI::ExistingDirectory);
+  add_log_options(app);
 }
 
 /// Runs `body`; an exception becomes one line on stderr and exit code 1.

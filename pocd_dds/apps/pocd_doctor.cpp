@@ -14,13 +14,15 @@
 namespace {
 
 using namespace pocd::dds;  // NOLINT: this file is about nothing else
+using pocd::NodeConfig;
+using pocd::NodeFile;
 
 struct DoctorOptions {
   BusOptions bus;
   std::vector<std::filesystem::path> files;
   std::vector<std::string> overrides, robots;
   double listen_s = 5.0;
-  bool verbose = false;
+  bool verbose = false, suggest = false;
   std::string proc = "/proc", shared_memory = "/dev/shm";
 };
 
@@ -77,6 +79,36 @@ class Progress {
   std::set<std::string> said_;
 };
 
+/// A configuration for what is on the bus, on stdout. False: no depth camera is there.
+bool suggest(const DoctorOptions& options) {
+  BusWatch watch;
+  BusOptions bus = options.bus;
+  bus.listener = &watch;
+  const Participant observer(bus);
+  BusPicture picture;
+  const auto end = std::chrono::steady_clock::now() +
+                   std::chrono::milliseconds(static_cast<long>(1e3 * options.listen_s));
+  while (!stop_requested && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    for (const BusEvent& event : watch.take()) picture.hear(event);
+  }
+  const std::vector<pocd::RobotConfig> robots = pocd::suggest_robots(picture.topics());
+  for (const pocd::RobotConfig& robot : robots) {
+    const auto tell = [&](const std::string& topic, const char* what) {
+      if (topic.empty()) std::cout << "# " << robot.name << ": " << what << '\n';
+    };
+    tell(robot.camera_info_topic, "no camera info is announced: no image can be used without");
+    tell(robot.segmentation_topic, "no masks are announced");
+    tell(robot.odometry_topic, "no odometry is announced: poses have to come on tf");
+  }
+  std::cout << pocd::suggestion_yaml(robots);
+  if (robots.empty()) {
+    std::cerr << "pocd_doctor: no depth images are announced on domain " << options.bus.domain
+              << "; " << pocd::suggestion_text(picture.topics()) << '\n';
+  }
+  return !robots.empty();
+}
+
 /// Listens as a node would, beside a participant that looks at who and what is there.
 Findings check_bus(const DoctorOptions& options, NodeFile config) {
   Findings findings;
@@ -90,7 +122,7 @@ Findings check_bus(const DoctorOptions& options, NodeFile config) {
   config.node.lossless = false;  // that would hold senders back
   FrameQueue frames(1);
   LatencyLog latency("");
-  Intake intake(listener, config.node, config.pipeline.classes, intake_watch, frames, latency);
+  Intake intake(listener, config.node, config.pipeline, intake_watch, frames, latency);
   const auto end = std::chrono::steady_clock::now() +
                    std::chrono::milliseconds(static_cast<long>(1e3 * options.listen_s));
   BusPicture picture;
@@ -143,11 +175,14 @@ int main(int argc, char** argv) {
   app.add_option("--listen", options.listen_s, "How long to listen to the bus [s]")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
+  app.add_flag("--suggest", options.suggest,
+               "Only print a configuration for the cameras that are on the bus (--config of "
+               "pocd_node and pocd_map)");
   app.add_flag("--verbose", options.verbose, "Say on stderr what is heard as soon as it is heard");
   app.add_option("--proc", options.proc, "Where the machine's /proc is")->capture_default_str();
   app.add_option("--shm", options.shared_memory, "Where shared memory is")->capture_default_str();
   int domain = -1;
-  add_bus_options(app, domain, options.bus.profiles_file);
+  add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
     options.bus.domain = domain >= 0 ? domain : default_domain();
@@ -161,6 +196,7 @@ int main(int argc, char** argv) {
     log_to_stderr("pocd_doctor");
     spdlog::set_level(spdlog::level::off);  // everything is a finding
     stop_on_signals();
+    if (options.suggest) return suggest(options) && std::cout.flush() ? 0 : 1;
     NodeFile config;
     Findings findings = check_configuration(options, config);
     add(findings, check_network_settings(options.proc));

@@ -32,24 +32,38 @@ void print(const NodeHealth& health) {
               static_cast<unsigned long long>(health.map_version()));
 }
 
-int check(const pocd::dds::BusOptions& bus, const std::string& name, double timeout_s) {
+struct Question {
+  std::string name = "pocd_node";
+  double timeout_s = 10.0;
+  bool ready = false;  ///< it has to be ready, too
+};
+
+int check(const pocd::dds::BusOptions& bus, const Question& question) {
   using Clock = std::chrono::steady_clock;
   pocd::dds::Wakeup wakeup;
   pocd::dds::Reader<pocd_msgs::msg::NodeHealthPubSubType> reader(
       std::make_shared<pocd::dds::Participant>(bus), pocd::dds::topics::kHealth, wakeup);
   const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                           std::chrono::duration<double>(timeout_s));
+                                           std::chrono::duration<double>(question.timeout_s));
   while (!pocd::dds::stop_requested && Clock::now() < deadline) {
     wakeup.wait_for(std::chrono::milliseconds(100));
     NodeHealth health;
     pocd::dds::SampleMeta meta;
     while (reader.take(health, meta)) {
-      if (!meta.valid || health.name() != name || health.message() == "stopped") continue;
+      if (!meta.valid || health.name() != question.name || health.message() == "stopped") continue;
+      const bool good = health.level() < 2 && (health.ready() || !question.ready);
+      // Who asks whether it is ready waits for it.
+      if (!good && question.ready && Clock::now() < deadline) continue;
       print(health);
-      return health.level() < 2 ? 0 : 1;
+      return good ? 0 : 1;
+    }
+    if (reader.take_misread() > 0) {
+      std::printf("%s: %s\n", reader.topic().c_str(), reader.misread_from().c_str());
+      return 1;
     }
   }
-  std::printf("%s was not heard on domain %d within %g s\n", name.c_str(), bus.domain, timeout_s);
+  std::printf("%s was not %s on domain %d within %g s\n", question.name.c_str(),
+              question.ready ? "ready" : "heard", bus.domain, question.timeout_s);
   return 1;
 }
 
@@ -64,15 +78,18 @@ int main(int argc, char** argv) {
       "pocd_health");
   pocd::dds::BusOptions bus;
   bus.name = "pocd_health";
-  std::string name = "pocd_node";
-  double timeout_s = 10.0;
+  Question question;
   app.set_version_flag("--version", POCD_VERSION);
-  app.add_option("--name", name, "Name of the node")->envname("POCD_NAME")->capture_default_str();
-  app.add_option("--timeout", timeout_s, "Seconds to wait for it")
+  app.add_option("--name", question.name, "Name of the node")
+      ->envname("POCD_NAME")
+      ->capture_default_str();
+  app.add_option("--timeout", question.timeout_s, "Seconds to wait for it")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
+  app.add_flag("--ready", question.ready,
+               "Wait until it is ready, too: it takes frames and publishes");
   int domain = -1;
-  pocd::dds::add_bus_options(app, domain, bus.profiles_file);
+  pocd::dds::add_bus_options(app, domain, bus.profiles_file, bus.security_folder);
   try {
     app.parse(argc, argv);
     bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
@@ -85,6 +102,6 @@ int main(int argc, char** argv) {
   return pocd::dds::guarded("pocd_health", [&] {
     pocd::dds::log_to_stderr("pocd_health");
     pocd::dds::stop_on_signals();
-    return check(bus, name, timeout_s);
+    return check(bus, question);
   });
 }

@@ -74,6 +74,7 @@ int follow(Options options) {
       events->add(event, name);
       if (options.changes_since_s) heard.push_back(event);
     };
+    options.mirror.callbacks.when_full = pocd::WhenFull::kWait;  // the file has every event
   }
   auto mirror = std::make_unique<pocd::MapMirror>(options.mirror);
   const auto start = std::chrono::steady_clock::now();
@@ -149,7 +150,8 @@ int main(int argc, char** argv) {
   app.add_option("--map-id", options.mirror.map_id, "Which map: node.map_id of its publisher")
       ->capture_default_str();
   int domain = -1;
-  pocd::dds::add_bus_options(app, domain, options.mirror.profiles_file);
+  pocd::dds::add_bus_options(app, domain, options.mirror.profiles_file,
+                             options.mirror.security_folder);
   try {
     app.parse(argc, argv);
     options.mirror.domain = domain >= 0 ? domain : pocd::dds::default_domain();

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "apps/common.hpp"
+#include "apps/service_notice.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd_dds/node/node.hpp"
 
@@ -16,7 +17,7 @@ std::uint64_t random_epoch() {
 
 /// The group of the configuration that pocd_parameters does not know.
 struct NodeGroup {
-  pocd::dds::NodeConfig node;
+  pocd::NodeConfig node;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -69,7 +70,7 @@ int main(int argc, char** argv) {
   app.add_option("--latency", options.latency_file,
                  "File for the time that each frame took from its last image to its map delta");
   int domain = -1;
-  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
+  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -103,6 +104,10 @@ int main(int argc, char** argv) {
     pocd::dds::log_to_stderr("pocd_node");
     pocd::dds::stop_on_signals();
     options.epoch = epoch ? *epoch : random_epoch();
+    pocd::dds::ServiceNotice service;
+    options.on_status = [&](const pocd::dds::NodeState& state, bool ending) {
+      service.tell(state, ending);
+    };
     pocd::dds::Node node(options);
     spdlog::info("running on domain {}, epoch {:016x}, {} robot(s) named{}", options.bus.domain,
                  options.epoch, options.config.node.robots.size(),

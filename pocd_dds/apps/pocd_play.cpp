@@ -2,7 +2,9 @@
 #include <set>
 
 #include "apps/common.hpp"
+#include "pocd/config/config_io.hpp"
 #include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/play/player.hpp"
 #include "pocd_dds/recording/replayer.hpp"
 
@@ -20,6 +22,11 @@ void add_replay_options(CLI::App& app, ReplayOptions& replay, std::vector<std::s
   };
   add(app.add_option("--topics", replay.topics,
                      "Pattern of topics to play; default: all; repeat it"))
+      ->allow_extra_args(false);
+  add(app.add_option("--latch", replay.latch,
+                     "Pattern of topics to play latched, whatever the recording says; repeat it"))
+      ->allow_extra_args(false);
+  add(app.add_option("--no-latch", replay.no_latch, "Pattern of topics not to play latched"))
       ->allow_extra_args(false);
   add(app.add_option("--remap", remap, "FROM=TO: play a topic under another name; repeat it"))
       ->allow_extra_args(false);
@@ -93,7 +100,9 @@ int main(int argc, char** argv) {
   double speed = 1.0;
   bool fast = false, no_wait = false;
   app.set_version_flag("--version", POCD_VERSION);
+  std::vector<std::string> input_settings;
   pocd::add_dataset_options(app, options.dataset);
+  pocd::add_topic_options(app, input_settings);
   app.get_option("--dataset")->required(false);
   app.get_option("--input")->required(false);
   app.get_option("--rate")->description(
@@ -119,7 +128,7 @@ int main(int argc, char** argv) {
   app.add_option("--map-frame", options.map_frame, "Frame that the poses are in")
       ->capture_default_str();
   int domain = -1;
-  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
+  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
     const bool has_dataset = app.count("--dataset") > 0 && app.count("--input") > 0;
@@ -130,6 +139,10 @@ int main(int argc, char** argv) {
     set_remap(remap, replay);
     // For recordings, --rate is the multiple of the original speed that it is with rosbag2.
     if (!has_dataset && app.count("--rate") > 0) speed = options.dataset.frame_rate_hz;
+    pocd::NodeFile file;
+    pocd::load_config(file, {}, input_settings);
+    options.dataset.input = file.node;
+    if (options.dataset.with_color) options.dataset.input.color = "optional";
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;

@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
   int domain = -1;
-  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file);
+  pocd::dds::add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();

@@ -31,7 +31,17 @@ builtin_interfaces::msg::Time to_time(StampNs stamp_ns) {
 }
 
 Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info) {
-  return camera_model(info.width(), info.height(), info.k());
+  CameraInfoFields fields;
+  fields.width = info.width();
+  fields.height = info.height();
+  fields.k = info.k();
+  fields.binning_x = info.binning_x();
+  fields.binning_y = info.binning_y();
+  fields.roi_x = info.roi().x_offset();
+  fields.roi_y = info.roi().y_offset();
+  fields.roi_width = info.roi().width();
+  fields.roi_height = info.roi().height();
+  return camera_model(fields);
 }
 
 Checked<StampedTransform> transform_from(const nav_msgs::msg::Odometry& odometry) {

@@ -1,15 +1,16 @@
 #include "pocd_dds/bridge/image_visit.hpp"
 
 #include "pocd/recording/bytes.hpp"
+#include "pocd_dds/entities/topic_table.hpp"
 #include "sensor_msgsPubSubTypes.h"
 
 namespace pocd::dds {
 
 using eprosima::fastrtps::rtps::SerializedPayload_t;
 
-ImageVisitType::ImageVisitType() {
+ImageVisitType::ImageVisitType(bool compressed) : compressed_(compressed) {
   const sensor_msgs::msg::ImagePubSubType generated;
-  setName(generated.getName());
+  setName(compressed ? topics::kCompressedImageType : generated.getName());
   m_typeSize = generated.m_typeSize;
   m_isGetKeyDefined = false;
 }
@@ -17,7 +18,8 @@ ImageVisitType::ImageVisitType() {
 bool ImageVisitType::deserialize(SerializedPayload_t* payload, void* data) {
   recording::RosImage image;
   try {
-    image = recording::decode_image(payload->data, payload->length);
+    image = compressed_ ? recording::decode_compressed_image(payload->data, payload->length)
+                        : recording::decode_image(payload->data, payload->length);
   } catch (const recording::DamagedData&) {
     return false;
   }

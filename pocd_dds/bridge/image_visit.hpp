@@ -1,4 +1,5 @@
-// sensor_msgs/Image for a subscriber that converts it where it lies, in the middleware's memory.
+// sensor_msgs/Image and CompressedImage for a subscriber that converts it where it lies, in the
+// middleware's memory.
 #pragma once
 
 #include <exception>
@@ -22,12 +23,12 @@ struct ImageVisit {
   }
 };
 
-/// Has the name of the generated type and reads the same payloads; cannot write any.
+/// Has the name of the type and reads its payloads; cannot write any.
 class ImageVisitType : public eprosima::fastdds::dds::TopicDataType {
  public:
   using type = ImageVisit;
 
-  ImageVisitType();
+  ImageVisitType() : ImageVisitType(false) {}
   /// False, without a call of `use`, for a payload that is no image.
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override;
 
@@ -36,6 +37,18 @@ class ImageVisitType : public eprosima::fastdds::dds::TopicDataType {
   void* createData() override { return new ImageVisit; }
   void deleteData(void* data) override { delete static_cast<ImageVisit*>(data); }
   bool getKey(void*, eprosima::fastrtps::rtps::InstanceHandle_t*, bool) override { return false; }
+
+ protected:
+  explicit ImageVisitType(bool compressed);
+
+ private:
+  const bool compressed_;
+};
+
+/// The same of sensor_msgs/CompressedImage.
+class CompressedImageVisitType : public ImageVisitType {
+ public:
+  CompressedImageVisitType() : ImageVisitType(true) {}
 };
 
 }  // namespace pocd::dds

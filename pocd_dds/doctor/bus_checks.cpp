@@ -1,14 +1,17 @@
 #include "pocd_dds/doctor/bus_checks.hpp"
 
+#include <algorithm>
 #include <set>
+
+#include "pocd/input/robot_topic.hpp"
+#include "pocd_dds/node/input_delivery.hpp"
 
 namespace pocd::dds {
 namespace {
 
 /// A topic that a robot should have.
 struct Expected {
-  std::string topic;
-  const TopicSpec& spec;
+  InputStream stream;
   Severity if_missing;
   std::string lacking;  ///< what it means that nobody announces it
 };
@@ -17,26 +20,41 @@ Severity severity_of(const std::string& use) {
   return use == "required" ? Severity::kError : Severity::kNote;
 }
 
-std::string or_else(const std::string& own, const std::string& pattern, const std::string& robot) {
-  return own.empty() ? robot_topic(pattern, robot) : own;
-}
-
-std::vector<Expected> expected_of(const RobotConfig& robot, const NodeConfig& node) {
-  const TopicPatterns& patterns = node.topics;
+std::vector<Expected> expected_of(const NodeConfig& node) {
   std::vector<Expected> list{
-      {or_else(robot.depth_topic, patterns.depth, robot.name), topics::kDepth, Severity::kError,
-       "no depth images: the robot is not there"},
-      {or_else(robot.camera_info_topic, patterns.camera_info, robot.name), topics::kCameraInfo,
-       Severity::kError, "no intrinsics: none of its images can be used"}};
+      {InputStream::kDepth, Severity::kError, "no depth images: the robot is not there"},
+      {InputStream::kCameraInfo, Severity::kError,
+       "no intrinsics: none of its images can be used"}};
   if (node.segmentation != "absent") {
-    list.push_back({or_else(robot.segmentation_topic, patterns.segmentation, robot.name),
-                    topics::kSegmentation, severity_of(node.segmentation), "no segmentation"});
+    list.push_back({InputStream::kSegmentation, severity_of(node.segmentation), "no segmentation"});
   }
   if (node.color != "absent") {
-    list.push_back({or_else(robot.color_topic, patterns.color, robot.name), topics::kColor,
-                    severity_of(node.color), "no colour images"});
+    list.push_back({InputStream::kColor, severity_of(node.color), "no colour images"});
   }
   return list;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "\"" : ", \"") + name + "\"";
+  return text;
+}
+
+/// What to do about a topic that nobody announces.
+std::string advice_for(const BusPicture& bus, const std::string& topic, InputStream stream) {
+  if (topic.compare(0, 3, "rt/") == 0) {
+    for (const std::string& bare : {topic.substr(3), topic.substr(2)}) {
+      if (bus.endpoints(bare, true).empty()) continue;
+      return "there is " + bare +
+             ", without rt/, which ROS 2 puts before its names: give that name "
+             "to the topic in the group `node`, or announce it as ROS 2 does";
+    }
+  }
+  if (stream == InputStream::kDepth) {
+    return "start the sender, or correct the name in the group `node.topics`; " +
+           suggestion_text(bus.topics());
+  }
+  return "start the sender, or correct the name in the group `node.topics`";
 }
 
 void check_writers(const std::vector<BusEndpoint>& writers, const std::string& topic,
@@ -46,6 +64,12 @@ void check_writers(const std::vector<BusEndpoint>& writers, const std::string& t
       findings.push_back({Severity::kError, topic,
                           "has type " + writer.type + ", expected " + spec.type,
                           "correct the sender, or the topic in the group `node.topics`"});
+    } else if (!writer.partitions.empty()) {
+      findings.push_back(
+          {Severity::kError, topic,
+           "is in the partition " + joined(writer.partitions) +
+               ": not heard, the component is in none",
+           "take the sender out of its partition, or put both into one by a profile"});
     } else if (writer.keyed != spec.keyed) {
       findings.push_back({Severity::kError, topic, "is keyed: keyed and unkeyed do not match",
                           "announce it as ROS 2 does"});
@@ -61,24 +85,56 @@ void check_writers(const std::vector<BusEndpoint>& writers, const std::string& t
 
 void check_robot(const BusPicture& bus, const RobotConfig& robot, const NodeConfig& node,
                  Findings& findings) {
-  for (const Expected& expected : expected_of(robot, node)) {
-    const auto writers = bus.endpoints(expected.topic, true);
+  for (const Expected& expected : expected_of(node)) {
+    const std::string topic = topic_of(node, robot, expected.stream);
+    const auto writers = bus.endpoints(topic, true);
     if (writers.empty()) {
-      findings.push_back({expected.if_missing, expected.topic,
-                          "nobody announces it: " + expected.lacking,
-                          "start the sender, or correct the name in the group `node.topics`"});
+      findings.push_back({expected.if_missing, topic, "nobody announces it: " + expected.lacking,
+                          advice_for(bus, topic, expected.stream)});
     }
-    check_writers(writers, expected.topic, expected.spec, node.lossless, findings);
+    check_writers(writers, topic, spec_of(expected.stream, topic), node.lossless, findings);
   }
-  const std::string odometry = or_else(robot.odometry_topic, node.topics.odometry, robot.name);
-  const std::string tf = robot_topic(node.topics.tf, robot.name);
-  const auto poses = bus.endpoints(odometry, true);
-  if (poses.empty() && bus.endpoints(tf, true).empty()) {
+  const std::string odometry = topic_of(node, robot, InputStream::kOdometry);
+  const std::string tf = topic_of(node, robot, InputStream::kTf);
+  const auto poses = bus.endpoints(odometry, true), transforms = bus.endpoints(tf, true);
+  if (poses.empty() && transforms.empty()) {
     findings.push_back({Severity::kError, odometry,
                         "nobody announces it, nor " + tf + ": " + robot.name + " has no pose",
                         "start odometry or localisation, or correct the names in `node.topics`"});
   }
   check_writers(poses, odometry, topics::kOdometry, node.lossless, findings);
+  check_writers(transforms, tf, topics::kTf, false, findings);
+}
+
+/// Robots whose topics lack the prefix of ROS 2.
+void find_bare_robots(const BusPicture& bus, const std::string& pattern, Findings& findings) {
+  if (pattern.compare(0, 3, "rt/") != 0) return;
+  for (const auto& [key, endpoint] : bus.all()) {
+    const bool bare = endpoint.writer && (robot_in(pattern.substr(3), endpoint.topic) ||
+                                          robot_in(pattern.substr(2), endpoint.topic));
+    if (!bare) continue;
+    findings.push_back({Severity::kError, endpoint.topic,
+                        "looks like depth images, but lacks rt/, which ROS 2 puts before its names",
+                        "name it in node.topics.depth, or announce it as ROS 2 does"});
+  }
+}
+
+/// What to do about a problem with messages.
+std::string advice_for(const std::string& reason) {
+  const auto is = [&](InputReason known) { return reason == to_string(known); };
+  if (is(InputReason::kNoMask)) {
+    return "send masks with the stamps of their depth images, raise node.stamp_tolerance_s, or "
+           "leave "
+           "such frames out (node.segmentation: required)";
+  }
+  if (is(InputReason::kUnlistedClass)) return "complete classes.list, or correct the network's ids";
+  if (is(InputReason::kNoUsableDepth)) return "see node.depth_scale and map.max_depth_m";
+  if (is(InputReason::kNoPose)) return "one clock for camera and poses; poses as often as images";
+  if (is(InputReason::kNoTransform)) {
+    return "send the transform, on tf or latched on tf_static, or give the robot a mount";
+  }
+  if (reason == "images_lost") return "see docs/operating.md: socket buffers";
+  return "correct the sender";
 }
 
 }  // namespace
@@ -109,25 +165,38 @@ std::vector<BusEndpoint> BusPicture::endpoints(const std::string& topic, bool wr
   return list;
 }
 
+std::vector<TopicInfo> BusPicture::topics() const {
+  std::vector<TopicInfo> list;
+  for (const auto& [key, endpoint] : endpoints_) {
+    if (endpoint.writer) list.push_back({endpoint.topic, ros_type_name(endpoint.type)});
+  }
+  std::sort(list.begin(), list.end(),
+            [](const TopicInfo& a, const TopicInfo& b) { return a.topic < b.topic; });
+  return list;
+}
+
 Findings check_topics(const BusPicture& bus, const NodeConfig& node) {
   Findings findings;
   std::map<std::string, RobotConfig> robots;
   for (const RobotConfig& robot : node.robots) robots[robot.name] = robot;
+  const std::string pattern = bus_name(node.topics.depth);
   if (node.discovers()) {
     for (const auto& [key, endpoint] : bus.all()) {
       const std::string name =
-          endpoint.writer ? robot_in(node.topics.depth, endpoint.topic).value_or("") : "";
+          endpoint.writer ? robot_in(pattern, endpoint.topic).value_or("") : "";
       if (!name.empty()) robots.emplace(name, RobotConfig{}).first->second.name = name;
     }
   }
   if (robots.empty()) {
-    findings.push_back({Severity::kError, node.topics.depth, "no robot announces depth images",
-                        "start one, check --domain, or correct node.topics.depth"});
+    findings.push_back({Severity::kError, pattern, "no robot announces depth images",
+                        "start one, check --domain, or correct node.topics.depth; " +
+                            suggestion_text(bus.topics())});
+    find_bare_robots(bus, pattern, findings);
   }
   for (const auto& [name, robot] : robots) check_robot(bus, robot, node, findings);
   std::set<std::string> transforms;
   for (const auto& [name, robot] : robots) {
-    transforms.insert(robot_topic(node.topics.tf_static, name));
+    transforms.insert(topic_of(node, robot, InputStream::kTfStatic));
   }
   for (const std::string& topic : transforms) {
     check_writers(bus.endpoints(topic, true), topic, topics::kTfStatic, true, findings);
@@ -148,7 +217,7 @@ Findings check_intake(const IntakeStatus& intake) {
     findings.push_back(
         {Severity::kError, problem.topic,
          problem.reason + " (" + std::to_string(problem.count) + " times): " + problem.detail,
-         "correct the sender"});
+         advice_for(problem.reason)});
   }
   for (const RobotStatus& robot : intake.robots) {
     if (!robot.live) continue;

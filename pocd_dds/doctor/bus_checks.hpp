@@ -4,10 +4,11 @@
 #include <map>
 #include <string>
 
+#include "pocd/config/node_config.hpp"
+#include "pocd/input/suggest_input.hpp"
 #include "pocd_dds/doctor/finding.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/intake.hpp"
-#include "pocd_dds/node/node_config.hpp"
 
 namespace pocd::dds {
 
@@ -20,6 +21,8 @@ class BusPicture {
   /// Writers or readers of a topic.
   std::vector<BusEndpoint> endpoints(const std::string& topic, bool writers) const;
   const std::map<EndpointKey, BusEndpoint>& all() const { return endpoints_; }
+  /// Of all writers, by name.
+  std::vector<TopicInfo> topics() const;
 
  private:
   std::map<ParticipantKey, std::string> participants_;

@@ -41,6 +41,7 @@ BusEvent endpoint_event(const Proxy& proxy, bool writer, bool gone) {
   event.endpoint.reliable = proxy.m_qos.m_reliability.kind == fdds::RELIABLE_RELIABILITY_QOS;
   event.endpoint.transient_local =
       proxy.m_qos.m_durability.kind >= fdds::TRANSIENT_LOCAL_DURABILITY_QOS;
+  event.endpoint.partitions = proxy.m_qos.m_partition.names();
   return event;
 }
 

@@ -19,6 +19,7 @@ struct BusEndpoint {
   EndpointKey key{};
   std::string topic, type;
   bool writer = true, keyed = false, reliable = false, transient_local = false;
+  std::vector<std::string> partitions;
 };
 
 struct BusEvent {

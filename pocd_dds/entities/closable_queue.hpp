@@ -38,9 +38,17 @@ class ClosableQueue {
   /// When full, the oldest items make room; `dropped` is called with each of them.
   template <class Dropped>
   void push_making_room(Item item, std::size_t weight, const Dropped& dropped) {
+    const auto oldest = [](const auto&) { return std::size_t{0}; };
+    push_making_room(std::move(item), weight, oldest, dropped);
+  }
+  /// The same with those that `choose` picks: it gets the items (pairs of item and weight, oldest
+  /// first) and gives an index.
+  template <class Choose, class Dropped>
+  void push_making_room(Item item, std::size_t weight, const Choose& choose,
+                        const Dropped& dropped) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      while (!items_.empty() && weight_ + weight > capacity_) dropped(take_first());
+      while (!items_.empty() && weight_ + weight > capacity_) dropped(take_at(choose(items_)));
       put(std::move(item), weight);
     }
     filled_.notify_one();
@@ -51,7 +59,7 @@ class ClosableQueue {
     std::unique_lock<std::mutex> lock(mutex_);
     filled_.wait_for(lock, time, [this] { return closed_ || !items_.empty(); });
     if (items_.empty()) return std::nullopt;
-    return take_first();
+    return take_at(0);
   }
   void close() {
     {
@@ -84,10 +92,11 @@ class ClosableQueue {
     weight_ += weight;
     items_.emplace_back(std::move(item), weight);
   }
-  Item take_first() {
-    Item item = std::move(items_.front().first);
-    weight_ -= items_.front().second;
-    items_.pop_front();
+  Item take_at(std::size_t index) {
+    const auto taken = items_.begin() + static_cast<std::ptrdiff_t>(index);
+    Item item = std::move(taken->first);
+    weight_ -= taken->second;
+    items_.erase(taken);
     return item;
   }
 

@@ -1,7 +1,6 @@
 #include "pocd_dds/entities/participant.hpp"
 
-#include <spdlog/spdlog.h>
-
+#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <cstdlib>
@@ -13,9 +12,13 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <typeindex>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/entities/bus_log.hpp"
+#include "pocd_dds/entities/idl_version.hpp"
 #include "pocd_dds/entities/socket_buffers.hpp"
+#include "pocd_dds/entities/type_watch.hpp"
 
 namespace pocd::dds {
 
@@ -54,7 +57,7 @@ void warn_of_small_buffers() {
   static std::once_flag once;
   std::call_once(once, [] {
     const std::string problem = socket_buffer_problem(kSocketBytes);
-    if (!problem.empty()) spdlog::warn("{}", problem);
+    if (!problem.empty()) log(LogLevel::kWarning, problem);
   });
 }
 
@@ -69,8 +72,10 @@ void apply(const Delivery& delivery, Qos& qos) {
   // The defaults, 10 instances and 5000 samples, make write() fail beyond them. 0 means no bound.
   qos.resource_limits().max_instances = delivery.max_instances;
   qos.resource_limits().max_samples = delivery.max_samples;
-  qos.resource_limits().max_samples_per_instance =
-      delivery.keep_last > 0 ? delivery.keep_last : delivery.max_samples;
+  qos.resource_limits().max_samples_per_instance = delivery.keep_last > 0 ? delivery.keep_last
+                                                   : delivery.max_samples_per_instance > 0
+                                                       ? delivery.max_samples_per_instance
+                                                       : delivery.max_samples;
   qos.resource_limits().allocated_samples = 0;
   if (delivery.deadline_s > 0.0) {
     qos.deadline().period = eprosima::fastrtps::Duration_t(delivery.deadline_s);
@@ -93,6 +98,42 @@ void lift_limits(const Delivery& delivery, Qos& qos) {
   }
 }
 
+/// With a discovery server (ROS_DISCOVERY_SERVER) a client is told of topics that it has itself,
+/// and of no other. Whoever looks at discovery, to find robots by their topics, is to be told of
+/// all.
+void follow_discovery_server(DomainParticipantQos& qos) {
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  if (discovery.discoveryProtocol != eprosima::fastrtps::rtps::DiscoveryProtocol_t::SIMPLE) return;
+  rtps::RemoteServerList_t servers;
+  if (!rtps::load_environment_server_info(servers) || servers.empty()) return;
+  discovery.discoveryProtocol = eprosima::fastrtps::rtps::DiscoveryProtocol_t::SUPER_CLIENT;
+  discovery.m_DiscoveryServers = servers;
+}
+
+/// Authentication, access control and encryption by DDS Security's built-in plugins. The files are
+/// those of an enclave of ROS 2, so that its tools can make them.
+void set_security(const std::string& folder, DomainParticipantQos& qos) {
+  const auto file = [&](const char* name) {
+    const auto path = std::filesystem::absolute(std::filesystem::path(folder) / name);
+    if (!std::filesystem::is_regular_file(path)) {
+      throw InputError(path.string() + ": no such file (security)");
+    }
+    return "file://" + path.string();
+  };
+  const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
+  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
+  auto& properties = qos.properties().properties();
+  properties.emplace_back("dds.sec.auth.plugin", "builtin.PKI-DH");
+  properties.emplace_back(auth + "identity_ca", file("identity_ca.cert.pem"));
+  properties.emplace_back(auth + "identity_certificate", file("cert.pem"));
+  properties.emplace_back(auth + "private_key", file("key.pem"));
+  properties.emplace_back("dds.sec.access.plugin", "builtin.Access-Permissions");
+  properties.emplace_back(access + "permissions_ca", file("permissions_ca.cert.pem"));
+  properties.emplace_back(access + "governance", file("governance.p7s"));
+  properties.emplace_back(access + "permissions", file("permissions.p7s"));
+  properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
+}
+
 }  // namespace
 
 int default_domain() {
@@ -107,6 +148,9 @@ int default_domain() {
 }
 
 struct Participant::Impl {
+  explicit Impl(DomainParticipantListener* listener) : watch(listener) {}
+
+  TypeWatch watch;
   DomainParticipant* participant = nullptr;
   Publisher* publisher = nullptr;
   Subscriber* subscriber = nullptr;
@@ -116,7 +160,20 @@ struct Participant::Impl {
     int users = 0;
   };
   std::map<std::string, UsedTopic> topics;
+  std::map<std::string, std::type_index> forms;  // of the types that are registered
 
+  /// The middleware knows types by name: the form that comes second would be dropped, and its
+  /// readers and writers given the first.
+  void register_type(const std::string& topic, TypeSupport& type) {
+    const TopicDataType& support = *type.get();
+    const auto [known, fresh] = forms.emplace(type.get_type_name(), typeid(support));
+    if (!fresh && known->second != typeid(support)) {
+      throw InputError("topic " + topic + ": this participant uses type " + type.get_type_name() +
+                       " in another form (" + known->second.name() + " and " +
+                       typeid(support).name() + "); give one of the two a participant of its own");
+    }
+    if (fresh) POCD_CHECK(type.register_type(participant) == ReturnCode_t::RETCODE_OK);
+  }
   std::shared_ptr<Topic> use(const std::string& name) {
     UsedTopic& used = topics.at(name);
     ++used.users;
@@ -137,7 +194,8 @@ struct Participant::Impl {
   }
 };
 
-Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Impl>()) {
+Participant::Participant(const BusOptions& options)
+    : impl_(std::make_unique<Impl>(options.listener)) {
   if (options.domain < 0 || options.domain > kLastDomain) {
     throw InputError("domain " + std::to_string(options.domain) + " is not in [0, 232]");
   }
@@ -169,16 +227,22 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   auto& tries = qos.wire_protocol().builtin.mutation_tries;
   if (tries == DomainParticipantQos().wire_protocol().builtin.mutation_tries) tries = kLastOfAHost;
   if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
+  if (options.listener != nullptr) follow_discovery_server(qos);
+  if (!options.security_folder.empty()) set_security(options.security_folder, qos);
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
   flow->name = kBackground;
   flow->max_bytes_per_period = 0;  // no limit: one that limits can block the process
   qos.flow_controllers().push_back(flow);
 
   impl_->participant =
-      factory->create_participant(options.domain, qos, options.listener, StatusMask::none());
+      factory->create_participant(options.domain, qos, &impl_->watch, StatusMask::none());
   if (impl_->participant == nullptr) {
     throw InputError("cannot join domain " + std::to_string(options.domain) +
-                     ": Fast DDS made no participant (see its messages; is a network up?)");
+                     ": Fast DDS made no participant (see its messages; is a network up?" +
+                     (options.security_folder.empty()
+                          ? ")"
+                          : " Are the files in " + options.security_folder +
+                                " of one authority and not expired?)"));
   }
   impl_->publisher = impl_->participant->create_publisher(PUBLISHER_QOS_DEFAULT);
   impl_->subscriber = impl_->participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
@@ -192,6 +256,7 @@ std::shared_ptr<Topic> Participant::topic(const std::string& name, TypeSupport t
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
   const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->register_type(name, type);
   const auto known = impl_->topics.find(name);
   if (known != impl_->topics.end()) {
     if (known->second.topic->get_type_name() != type.get_type_name()) {
@@ -200,13 +265,14 @@ std::shared_ptr<Topic> Participant::topic(const std::string& name, TypeSupport t
     }
     return impl_->use(name);
   }
-  if (impl_->participant->find_type(type.get_type_name()).empty()) {
-    POCD_CHECK(type.register_type(impl_->participant) == ReturnCode_t::RETCODE_OK);
-  }
   Topic* topic = impl_->participant->create_topic(name, type.get_type_name(), TOPIC_QOS_DEFAULT);
   if (topic == nullptr) throw InputError("cannot create topic " + name);
   impl_->topics[name] = {topic, 0};
   return impl_->use(name);
+}
+
+std::optional<std::string> Participant::other_version(const Guid& endpoint) const {
+  return impl_->watch.other_version(endpoint);
 }
 
 DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& delivery) const {

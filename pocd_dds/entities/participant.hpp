@@ -1,12 +1,14 @@
 // The one DDS participant of a process, and what belongs to it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "pocd_dds/entities/topic_table.hpp"
@@ -17,6 +19,9 @@ struct BusOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd";
+  /// Folder with the identity and the permissions of this participant (docs/security.md): it then
+  /// talks to nobody who has none by the same authority. Empty: no security.
+  std::string security_folder = "";
   /// Others forget this participant when they have not heard of it for so long [s].
   double lease_s = 5.0;
   /// Hears of everything that is discovered, from the first moment; must outlive the participant.
@@ -32,14 +37,16 @@ int default_domain();
 /// a topic replaces the table's quality of service of the readers or writers of that topic.
 class Participant {
  public:
-  /// Throws InputError: no such domain, unreadable profiles, or no participant to be had.
+  /// Throws InputError: no such domain, unreadable profiles, files of security that are missing, or
+  /// no participant to be had.
   explicit Participant(const BusOptions& options);
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
   /// The topic, made on first use; it goes with its last user, who has to have deleted its reader
-  /// or writer by then. Throws InputError when the name is taken by another type.
+  /// or writer by then. Throws InputError when the name is taken by another type, or the name of
+  /// the type by another way to read and write it.
   std::shared_ptr<eprosima::fastdds::dds::Topic> topic(const std::string& name,
                                                        eprosima::fastdds::dds::TypeSupport type);
 
@@ -47,6 +54,11 @@ class Participant {
                                                    const Delivery& delivery) const;
   eprosima::fastdds::dds::DataReaderQos reader_qos(const std::string& topic,
                                                    const Delivery& delivery) const;
+
+  using Guid = std::array<std::uint8_t, 16>;
+  /// When this reader or writer of another participant announces another version of its type than
+  /// this process has: who it is and what the versions are, in words.
+  std::optional<std::string> other_version(const Guid& endpoint) const;
 
   eprosima::fastdds::dds::DomainParticipant* get() const;
   eprosima::fastdds::dds::Publisher* publisher() const;

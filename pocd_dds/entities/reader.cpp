@@ -1,7 +1,5 @@
 #include "pocd_dds/entities/reader.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <atomic>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -14,6 +12,8 @@
 #include <utility>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/entities/bus_log.hpp"
+#include "pocd_dds/entities/idl_version.hpp"
 #include "pocd_dds/entities/policy_name.hpp"
 
 namespace pocd::dds {
@@ -29,7 +29,8 @@ struct RawReader::Impl : DataReaderListener {
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
   std::atomic<std::uint64_t> incompatible{0}, told{0}, lost{0};
-  std::uint64_t damaged = 0;  // by the thread that takes
+  std::uint64_t damaged = 0, misread = 0;  // by the thread that takes
+  std::string misread_from;
   bool reliable = false;
   mutable std::mutex mutex;
   std::set<SampleMeta::Guid> writers;
@@ -68,8 +69,8 @@ struct RawReader::Impl : DataReaderListener {
       refused_policy = policy;
     }
     if (incompatible.fetch_add(1) == 0) {
-      spdlog::warn("{}: a writer does not offer the {} that is asked for: it is not heard", topic,
-                   policy);
+      log_warning("{}: a writer does not offer the {} that is asked for: it is not heard", topic,
+                  policy);
     }
   }
 };
@@ -83,7 +84,8 @@ RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& 
   impl_->topic = topic_;
   Participant& owner = *impl_->participant;
   impl_->use = owner.topic(topic_, type);
-  const DataReaderQos qos = owner.reader_qos(topic_, delivery);
+  DataReaderQos qos = owner.reader_qos(topic_, delivery);
+  qos.user_data().data_vec(idl_announcement(spec.type));
   impl_->reliable = qos.reliability().kind == RELIABLE_RELIABILITY_QOS;
   impl_->reader = owner.subscriber()->create_datareader(impl_->use.get(), qos, impl_.get());
   if (impl_->reader == nullptr) throw InputError("cannot create a reader of topic " + topic_);
@@ -113,33 +115,41 @@ std::uint64_t RawReader::lost() const { return impl_->lost; }
 std::size_t RawReader::unread() const { return impl_->reader->get_unread_count(); }
 
 std::uint64_t RawReader::take_damaged() { return std::exchange(impl_->damaged, 0); }
+std::uint64_t RawReader::take_misread() { return std::exchange(impl_->misread, 0); }
+const std::string& RawReader::misread_from() const { return impl_->misread_from; }
 void RawReader::wake_again() { impl_->wakeup->wake(); }
 
 bool RawReader::take_raw(void* sample, SampleMeta& meta) {
   SampleInfo info;
   // A damaged sample ends the call without a sample, though good ones may be behind it.
-  constexpr int kMostDamaged = 100;
-  for (int i = 0;; ++i) {
+  constexpr int kMostBad = 100;
+  for (int bad = 0; bad < kMostBad; ++bad) {
     const std::uint64_t damaged_before = damaged_payloads();
     const auto taken = impl_->reader->take_next_sample(sample, &info);
     const std::uint64_t damaged = damaged_payloads() - damaged_before;
     impl_->damaged += damaged;
-    if (taken == ReturnCode_t::RETCODE_OK) break;
-    if (damaged == 0) return false;
-    if (i == kMostDamaged) {
-      wake_again();
-      return false;
+    const bool got = taken == ReturnCode_t::RETCODE_OK;
+    if (!got && damaged == 0) return false;
+    if (!got) continue;
+    const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
+    std::copy(writer, writer + meta.writer.size(), meta.writer.begin());
+    // Its bytes may be read as this type, and mean something else.
+    const std::optional<std::string> other = impl_->participant->other_version(meta.writer);
+    if (other) {
+      ++impl_->misread;
+      impl_->misread_from = *other;
+      continue;
     }
+    meta.valid = info.valid_data;
+    // The state is that of the instance now: of a sample that was followed by a dispose, too.
+    meta.disposed = !info.valid_data && info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
+    const eprosima::fastrtps::rtps::octet* key = info.instance_handle.value;
+    std::copy(key, key + meta.key.size(), meta.key.begin());
+    meta.received_ns = info.reception_timestamp.to_ns();
+    return true;
   }
-  meta.valid = info.valid_data;
-  // The state is that of the instance now: of a sample that was followed by a dispose, too.
-  meta.disposed = !info.valid_data && info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
-  const eprosima::fastrtps::rtps::octet* key = info.instance_handle.value;
-  std::copy(key, key + meta.key.size(), meta.key.begin());
-  const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
-  std::copy(writer, writer + meta.writer.size(), meta.writer.begin());
-  meta.received_ns = info.reception_timestamp.to_ns();
-  return true;
+  wake_again();
+  return false;
 }
 
 }  // namespace pocd::dds

@@ -57,6 +57,10 @@ class RawReader {
   /// Samples that could not be read since the last call; take() leaves them out. From the thread
   /// that takes.
   std::uint64_t take_damaged();
+  /// The same for samples of writers whose version of the type is another one, and the last such
+  /// writer, in words; "" without any.
+  std::uint64_t take_misread();
+  const std::string& misread_from() const;
 
  protected:
   bool take_raw(void* sample, SampleMeta& meta);

@@ -1,6 +1,7 @@
 // Every topic of the component: name, type, quality of service, direction. Nothing else names one.
 #pragma once
 
+#include "pocd/input/input_config.hpp"
 #include "pocd/input/robot_topic.hpp"
 
 namespace pocd::dds {
@@ -14,6 +15,9 @@ struct Delivery {
   int max_instances = 0;    ///< of keyed topics; 0: not bounded
   bool background = false;  ///< sent, and sent again, by a thread of its own
   double deadline_s = 0.0;  ///< 0: none
+  /// Of keyed topics that keep all: 0: not bounded. Fast DDS makes no reader whose max_samples is
+  /// less than this times max_instances.
+  int max_samples_per_instance = 0;
 };
 
 enum class Direction { kIn, kOut, kBoth };
@@ -35,22 +39,29 @@ constexpr Delivery latched(int keep_last, int max_instances = 0) {
   return {true, true, keep_last, 0, max_instances, false, 0};
 }
 
-inline constexpr TopicSpec kDepth{"rt/{robot}/depth/image_raw", "sensor_msgs::msg::dds_::Image_",
+inline constexpr TopicSpec kDepth{input_names::kDepth, "sensor_msgs::msg::dds_::Image_",
                                   Direction::kIn, false, best_effort(5)};
-inline constexpr TopicSpec kCameraInfo{"rt/{robot}/depth/camera_info",
+/// What the image topics may have instead.
+inline constexpr char kCompressedImageType[] = "sensor_msgs::msg::dds_::CompressedImage_";
+inline constexpr TopicSpec kCameraInfo{input_names::kCameraInfo,
                                        "sensor_msgs::msg::dds_::CameraInfo_", Direction::kIn, false,
                                        best_effort(5)};
-inline constexpr TopicSpec kSegmentation{"rt/{robot}/segmentation",
+inline constexpr TopicSpec kSegmentation{input_names::kSegmentation,
                                          "sensor_msgs::msg::dds_::Image_", Direction::kIn, false,
                                          best_effort(5)};
-inline constexpr TopicSpec kColor{"rt/{robot}/color/image_raw", "sensor_msgs::msg::dds_::Image_",
+inline constexpr TopicSpec kColor{input_names::kColor, "sensor_msgs::msg::dds_::Image_",
                                   Direction::kIn, false, best_effort(5)};
-inline constexpr TopicSpec kOdometry{"rt/{robot}/odom", "nav_msgs::msg::dds_::Odometry_",
+inline constexpr TopicSpec kOdometry{input_names::kOdometry, "nav_msgs::msg::dds_::Odometry_",
                                      Direction::kIn, false, best_effort(20)};
-inline constexpr TopicSpec kTf{"rt/tf", "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn, false,
-                               best_effort(100)};
-inline constexpr TopicSpec kTfStatic{"rt/tf_static", "tf2_msgs::msg::dds_::TFMessage_",
-                                     Direction::kIn, false, latched(100)};
+inline constexpr TopicSpec kTf{input_names::kTf, "tf2_msgs::msg::dds_::TFMessage_", Direction::kIn,
+                               false, best_effort(100)};
+// Every broadcaster says its transforms once and for all: not one sample may make room for another.
+// A reader that is full has the others sent again when it has been emptied.
+inline constexpr TopicSpec kTfStatic{input_names::kTfStatic,
+                                     "tf2_msgs::msg::dds_::TFMessage_",
+                                     Direction::kIn,
+                                     false,
+                                     {true, true, 0, 10000, 0, false, 0}};
 inline constexpr TopicSpec kClock{"rt/clock", "rosgraph_msgs::msg::dds_::Clock_", Direction::kBoth,
                                   false, reliable(1)};
 

@@ -1,7 +1,5 @@
 #include "pocd_dds/entities/writer.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
@@ -9,6 +7,8 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include "pocd/common/check.hpp"
+#include "pocd_dds/entities/bus_log.hpp"
+#include "pocd_dds/entities/idl_version.hpp"
 #include "pocd_dds/entities/policy_name.hpp"
 
 namespace pocd::dds {
@@ -22,17 +22,25 @@ struct RawWriter::Impl : DataWriterListener {
   DataWriter* writer = nullptr;
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
-  std::atomic<std::uint64_t> incompatible{0};
+  std::atomic<std::uint64_t> incompatible{0}, misreaders{0};
 
   void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override {
     matched = status.current_count;
     ever_matched = status.total_count;
+    if (status.current_count_change <= 0) return;
+    Participant::Guid reader{};
+    const eprosima::fastrtps::rtps::octet* bytes = status.last_subscription_handle.value;
+    std::copy(bytes, bytes + reader.size(), reader.begin());
+    const std::optional<std::string> other = participant->other_version(reader);
+    if (other && misreaders.fetch_add(1) == 0) {
+      log_warning("{}: a reader cannot make use of it: {}", topic, *other);
+    }
   }
   void on_offered_incompatible_qos(DataWriter*,
                                    const OfferedIncompatibleQosStatus& status) override {
     if (incompatible.fetch_add(1) == 0) {
-      spdlog::warn("{}: a reader asks for {} that is not offered: it gets nothing", topic,
-                   policy_name(static_cast<std::int32_t>(status.last_policy_id)));
+      log_warning("{}: a reader asks for {} that is not offered: it gets nothing", topic,
+                  policy_name(static_cast<std::int32_t>(status.last_policy_id)));
     }
   }
 };
@@ -45,8 +53,9 @@ RawWriter::RawWriter(std::shared_ptr<Participant> participant, const TopicSpec& 
   impl_->topic = topic_;
   Participant& owner = *impl_->participant;
   impl_->use = owner.topic(topic_, type);
-  impl_->writer = owner.publisher()->create_datawriter(
-      impl_->use.get(), owner.writer_qos(topic_, delivery), impl_.get());
+  DataWriterQos qos = owner.writer_qos(topic_, delivery);
+  qos.user_data().data_vec(idl_announcement(spec.type));
+  impl_->writer = owner.publisher()->create_datawriter(impl_->use.get(), qos, impl_.get());
   if (impl_->writer == nullptr) throw InputError("cannot create a writer of topic " + topic_);
 }
 
@@ -72,7 +81,7 @@ bool RawWriter::wait_acknowledged(std::chrono::steady_clock::time_point end) {
 
 bool RawWriter::write_raw(void* sample) {
   if (impl_->writer->write(sample)) return true;
-  if (failures_.fetch_add(1) == 0) spdlog::error("{}: Fast DDS refused to write a sample", topic_);
+  if (failures_.fetch_add(1) == 0) log_error("{}: Fast DDS refused to write a sample", topic_);
   return false;
 }
 
@@ -81,7 +90,7 @@ bool RawWriter::dispose_raw(void* sample) {
   // and counts against max_instances.
   if (impl_->writer->unregister_instance(sample, HANDLE_NIL) == ReturnCode_t::RETCODE_OK)
     return true;
-  if (failures_.fetch_add(1) == 0) spdlog::error("{}: Fast DDS refused to dispose", topic_);
+  if (failures_.fetch_add(1) == 0) log_error("{}: Fast DDS refused to dispose", topic_);
   return false;
 }
 

@@ -1,22 +1,23 @@
 #include "pocd_dds/map_mirror.hpp"
 
-#include <atomic>
 #include <condition_variable>
 #include <cstdio>
 #include <initializer_list>
 #include <mutex>
 #include <random>
-#include <thread>
 #include <tuple>
 
+#include "mirror/callback_thread.hpp"
 #include "mirror/catch_up.hpp"
 #include "mirror/part_assembler.hpp"
 #include "mirror/publishers.hpp"
+#include "mirror/reading_thread.hpp"
 #include "mirror/shared_participant.hpp"
 #include "pocd/map/map_follower.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
+#include "pocd_dds/entities/bus_log.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_msgsPubSubTypes.h"
@@ -61,7 +62,8 @@ struct MapMirror::Impl {
   explicit Impl(const MirrorOptions& given)
       : options(given),
         id(random_id()),
-        participant(dds::shared_participant({given.domain, given.profiles_file, given.name})),
+        participant(dds::shared_participant(
+            {given.domain, given.profiles_file, given.name, given.security_folder})),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         deltas(participant, dds::topics::kMapDeltas, wakeup),
         object_states(participant, dds::topics::kObjects, dds::topics::kObjects.name,
@@ -69,15 +71,16 @@ struct MapMirror::Impl {
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
         plan(given.catch_up),
-        thread([this] { run(); }) {}
+        callbacks(given.callbacks, [this](const std::string& text) { tell(text); }),
+        thread([this] { turn(); }, [this](const std::string& text) { tell(text); }) {}
 
   ~Impl() {
-    stopping = true;
-    wakeup.wake();
-    thread.join();
+    callbacks.stop_waiting();
+    thread.stop([this] { wakeup.wake(); });
   }
 
-  void run();
+  void tell(const std::string& text) const { dds::log_error("{}: {}", options.name, text); }
+  void turn();
   /// Of this map, and not of a publisher beside the one that is followed.
   template <class Message>
   bool ours(const Message& message) const {
@@ -126,26 +129,24 @@ struct MapMirror::Impl {
   std::uint64_t asked = 0, damaged = 0;
   dds::ProblemCounter problems;
 
-  std::atomic<bool> stopping{false};
-  std::thread thread;
+  dds::CallbackThread callbacks;
+  dds::ReadingThread thread;
 };
 
-void MapMirror::Impl::run() {
-  while (!stopping) {
-    wakeup.wait_for(kIdle);
-    take_events();
-    {
-      const std::lock_guard<std::mutex> lock(mutex);
-      take_objects();
-      take_deltas();
-      take_replies();
-      take_manifests();
-      take_tiles();
-      count_damaged();
-      catch_up();
-    }
-    changed.notify_all();
+void MapMirror::Impl::turn() {
+  wakeup.wait_for(kIdle);
+  take_events();
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    take_objects();
+    take_deltas();
+    take_replies();
+    take_manifests();
+    take_tiles();
+    count_damaged();
+    catch_up();
   }
+  changed.notify_all();
 }
 
 void MapMirror::Impl::take_objects() {
@@ -166,9 +167,10 @@ void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
 
 void MapMirror::Impl::take_events() {
   events.take_some(kMost, [&](const msg::ObjectEvent& message, const dds::SampleMeta& meta) {
-    if (meta.valid && options.on_event && message.map_id() == options.map_id) {
-      options.on_event(dds::event_from(message), message.class_name());
-    }
+    if (!meta.valid || !options.on_event || message.map_id() != options.map_id) return;
+    callbacks.call([this, event = dds::event_from(message), name = message.class_name()] {
+      options.on_event(event, name);
+    });
   });
 }
 
@@ -325,7 +327,13 @@ MirrorStatus MapMirror::Impl::status_now() const {
   status.publishers = rivals.size() + status.publisher_present;
   const bool ended =
       manifest && manifest->final_version() && manifest->version() == replica.version();
+  status.callbacks = callbacks.status();
+  status.failures = thread.failures();
+  status.last_failure = thread.last_failure();
   status.stale_because = follower.stale_because();
+  if (!manifest && !manifests.misread_from().empty()) {
+    status.stale_because = std::string(manifests.topic()) + ": " + manifests.misread_from();
+  }
   if (status.stale_because.empty() && !ended && !status.publisher_present) {
     status.stale_because = "the publisher has gone without ending its run";
   }

@@ -1,17 +1,18 @@
 #include "pocd_dds/object_watch.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <initializer_list>
 #include <iterator>
 #include <map>
 #include <mutex>
 #include <set>
-#include <thread>
 
+#include "mirror/callback_thread.hpp"
+#include "mirror/reading_thread.hpp"
 #include "mirror/shared_participant.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
+#include "pocd_dds/entities/bus_log.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
@@ -22,11 +23,15 @@ constexpr std::chrono::milliseconds kIdle{50};
 constexpr int kMost = 1000;  // samples of a topic in one turn, so that no peer holds up the others
 
 /// With the last sample only, a dispose would take the place of a state that was not read yet, and
-/// a state that of the one before.
-dds::Delivery every_sample() {
+/// a state that of the one before. What finds no room is sent again when there is some.
+dds::Delivery every_sample(std::size_t most_objects) {
+  constexpr int kPerObject = 8, kBeyond = 1000;  // those beyond are counted
   dds::Delivery delivery = dds::topics::kObjects.delivery;
   delivery.keep_last = 0;
-  delivery.max_instances = 0;
+  delivery.max_instances =
+      static_cast<int>(std::min<std::size_t>(most_objects, 10000000)) + kBeyond;
+  delivery.max_samples_per_instance = kPerObject;
+  delivery.max_samples = kPerObject * delivery.max_instances;
   return delivery;
 }
 
@@ -35,19 +40,21 @@ dds::Delivery every_sample() {
 struct ObjectWatch::Impl {
   explicit Impl(const ObjectWatchOptions& given)
       : options(given),
-        participant(dds::shared_participant({given.domain, given.profiles_file, given.name})),
-        states(participant, dds::topics::kObjects, dds::topics::kObjects.name, every_sample(),
-               wakeup),
+        participant(dds::shared_participant(
+            {given.domain, given.profiles_file, given.name, given.security_folder})),
+        states(participant, dds::topics::kObjects, dds::topics::kObjects.name,
+               every_sample(given.most_objects), wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         manifests(participant, dds::topics::kMapManifest, wakeup),
-        thread([this] { run(); }) {}
+        callbacks(given.callbacks, [this](const std::string& text) { tell(text); }),
+        thread([this] { turn(); }, [this](const std::string& text) { tell(text); }) {}
   ~Impl() {
-    stopping = true;
-    wakeup.wake();
-    thread.join();
+    callbacks.stop_waiting();
+    thread.stop([this] { wakeup.wake(); });
   }
 
-  void run();
+  void tell(const std::string& text) const { dds::log_error("{}: {}", options.name, text); }
+  void turn();
   void take_states();
   void take_events();
   void take_manifests();
@@ -65,25 +72,32 @@ struct ObjectWatch::Impl {
   dds::Reader<pocd_msgs::msg::ObjectEventPubSubType> events;
   std::map<std::array<std::uint8_t, 16>, Known> known;
   dds::Reader<pocd_msgs::msg::MapManifestPubSubType> manifests;
-  std::mutex mutex;                            // guards publishers
+  mutable std::mutex mutex;                    // guards publishers and counts
   std::set<dds::SampleMeta::Guid> publishers;  // writers of this map's manifest, of runs that go on
   std::pair<int, int> matched_before{0, 0};
-  dds::ProblemCounter problems;  // tells of the first on stderr
-  std::atomic<bool> stopping{false};
-  std::thread thread;
+  dds::ProblemCounter problems;  // tells of the first
+  std::uint64_t too_many = 0;
+  WatchStatus counts;
+  dds::CallbackThread callbacks;
+  dds::ReadingThread thread;
 };
 
-void ObjectWatch::Impl::run() {
-  while (!stopping) {
-    wakeup.wait_for(kIdle);
-    take_states();
-    take_events();
-    take_manifests();
-    for (dds::RawReader* reader :
-         std::initializer_list<dds::RawReader*>{&states, &events, &manifests}) {
-      problems.count_damaged(*reader);
-    }
+void ObjectWatch::Impl::turn() {
+  wakeup.wait_for(kIdle);
+  take_states();
+  take_events();
+  take_manifests();
+  std::string refused;
+  for (dds::RawReader* reader :
+       std::initializer_list<dds::RawReader*>{&states, &events, &manifests}) {
+    problems.count_damaged(*reader);
+    if (!reader->misread_from().empty()) refused = reader->topic() + ": " + reader->misread_from();
   }
+  const std::lock_guard<std::mutex> lock(mutex);
+  counts.objects = known.size();
+  counts.too_many = too_many;
+  counts.corrupt = problems.total();
+  counts.refused = std::move(refused);
 }
 
 void ObjectWatch::Impl::take_states() {
@@ -92,11 +106,16 @@ void ObjectWatch::Impl::take_states() {
     if (meta.disposed) gone(meta.key, Gone::kRemoved);
     // Not valid and not disposed: its node has gone, which says nothing about the object.
     if (!meta.valid || state.map_id() != options.map_id) return;
+    if (known.size() >= options.most_objects && known.count(state.uuid()) == 0) {
+      if (too_many++ == 0) tell("more than most_objects are on the bus (said once, counted)");
+      return;
+    }
     taken = true;
     Known& entry = known[state.uuid()];
     entry = {{state.uuid(), state.epoch(), state.class_name(), dds::object_from(state)},
              meta.writer};
-    if (options.on_object) options.on_object(entry.object);
+    if (!options.on_object) return;
+    callbacks.call([this, object = entry.object] { options.on_object(object); });
   });
   // The bus may tell of a writer after its first sample.
   const std::pair<int, int> matched{states.matched(), states.ever_matched()};
@@ -116,15 +135,18 @@ void ObjectWatch::Impl::forget_replaced() {
 void ObjectWatch::Impl::gone(const std::array<std::uint8_t, 16>& uuid, Gone why) {
   const auto entry = known.find(uuid);
   if (entry == known.end()) return;
-  const WatchedObject last = std::move(entry->second.object);
+  WatchedObject last = std::move(entry->second.object);
   known.erase(entry);
-  if (options.on_gone) options.on_gone(last, why);
+  if (!options.on_gone) return;
+  callbacks.call([this, last = std::move(last), why] { options.on_gone(last, why); });
 }
 
 void ObjectWatch::Impl::take_events() {
   events.take_some(kMost, [&](const auto& message, const dds::SampleMeta& meta) {
     if (!meta.valid || !options.on_event || message.map_id() != options.map_id) return;
-    options.on_event(dds::event_from(message), message.class_name());
+    callbacks.call([this, event = dds::event_from(message), name = message.class_name()] {
+      options.on_event(event, name);
+    });
   });
 }
 
@@ -151,6 +173,18 @@ bool ObjectWatch::publisher_present() const {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   return std::any_of(impl_->publishers.begin(), impl_->publishers.end(),
                      [&](const auto& writer) { return impl_->manifests.has_writer(writer); });
+}
+
+WatchStatus ObjectWatch::status() const {
+  WatchStatus status;
+  {
+    const std::lock_guard<std::mutex> lock(impl_->mutex);
+    status = impl_->counts;
+  }
+  status.callbacks = impl_->callbacks.status();
+  status.failures = impl_->thread.failures();
+  status.last_failure = impl_->thread.last_failure();
+  return status;
 }
 
 }  // namespace pocd

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -25,12 +26,15 @@ class FrameQueue {
  public:
   explicit FrameQueue(std::size_t capacity) : frames_(capacity) {}
 
-  /// When full, the oldest frame is dropped and counted.
+  /// When full, the oldest frame of the robot that has most of them (this one included) is dropped
+  /// and counted: who sends much does not push out who sends little.
   void push_dropping(Frame frame) {
-    frames_.push_making_room(std::move(frame), 1, [this](const Frame& oldest) {
+    const std::string robot = frame.robot;
+    const auto choose = [&robot](const auto& frames) { return unfair(frames, robot); };
+    frames_.push_making_room(std::move(frame), 1, choose, [this](const Frame& gone) {
       const std::lock_guard<std::mutex> lock(mutex_);
       dropped_frames_.push_back(
-          {oldest.robot, oldest.stamp_ns, !oldest.labels.empty(), !oldest.color.empty()});
+          {gone.robot, gone.stamp_ns, !gone.labels.empty(), !gone.color.empty()});
       ++dropped_;
     });
   }
@@ -54,6 +58,21 @@ class FrameQueue {
   }
 
  private:
+  /// Index of the oldest frame of the robot with most frames; of equal ones, the oldest frame.
+  template <class Frames>
+  static std::size_t unfair(const Frames& frames, const std::string& coming) {
+    std::map<std::string, std::size_t> count{{coming, 1}};
+    for (const auto& entry : frames) ++count[entry.first.robot];
+    std::size_t most = 0, index = 0;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const std::size_t of_robot = count.at(frames[i].first.robot);
+      if (of_robot <= most) continue;
+      most = of_robot;
+      index = i;
+    }
+    return index;
+  }
+
   ClosableQueue<Frame> frames_;
   mutable std::mutex mutex_;  // of what follows
   std::uint64_t dropped_ = 0;

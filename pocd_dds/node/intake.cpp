@@ -1,10 +1,13 @@
 #include "pocd_dds/node/intake.hpp"
 
+#include <pthread.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 
 #include "pocd/common/check.hpp"
+#include "pocd/input/robot_topic.hpp"
+#include "pocd_dds/node/input_delivery.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -26,20 +29,22 @@ StampNs wall_clock_ns() {
 }  // namespace
 
 Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-               const ClassMap& classes, BusWatch& watch, FrameQueue& queue, LatencyLog& latency)
+               const PipelineConfig& pipeline, BusWatch& watch, FrameQueue& queue,
+               LatencyLog& latency)
     : participant_(participant),
       node_(node),
       watch_(watch),
       queue_(queue),
       latency_(latency),
-      colours_(classes),
+      labels_(pipeline.classes),
       topics_(node),
       roster_(node),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
-      tf_(node.topics.own_tf()
-              ? nullptr
-              : std::make_unique<TransformInput>(participant, node.topics.tf, node.topics.tf_static,
-                                                 node.lossless, wakeup_)),
+      tf_(node.topics.own_tf() ? nullptr
+                               : std::make_unique<TransformInput>(
+                                     participant, bus_name(node.topics.tf),
+                                     bus_name(node.topics.tf_static), node.lossless, tf_wakeup_)),
+      context_{node_, labels_, pipeline.map.max_depth_m, transforms_, problems_},
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
   for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
   update_status();
@@ -59,10 +64,12 @@ void Intake::stop() {
 }
 
 void Intake::run() {
+  pthread_setname_np(pthread_self(), "pocd_intake");
   try {
     while (!stopping_) {
       wakeup_.wait_for(kIdle);
       step(false);
+      pulse_.beat();
     }
     step(true);
   } catch (...) {
@@ -75,27 +82,41 @@ void Intake::run() {
 void Intake::meet(const std::string& name, const RobotConfig& config, bool named) {
   Robot& robot = robots_[name];
   robot.named = named;
-  robot.input = std::make_unique<RobotInput>(participant_, node_, config, colours_, transforms_,
-                                             problems_, wakeup_, latency_);
+  robot.wakeup = std::make_unique<Wakeup>(wakeup_);
+  robot.input = std::make_unique<RobotInput>(participant_, node_, config, context_, problems_,
+                                             *robot.wakeup, latency_);
+  // Setting a fleet up takes time, in which what was latched goes on to arrive.
+  if (tf_) tf_->drain_static(transforms_, problems_);
 }
 
-void Intake::follow_roster() {
+bool Intake::follow_roster() {
   const auto now = Roster::Clock::now();
-  for (const BusEvent& event : watch_.take()) {
+  const std::vector<BusEvent> events = watch_.take();
+  for (const BusEvent& event : events) {
     check_type(event);
     follow(roster_.hear(event, now));
   }
-  follow(roster_.settle(now));
+  const std::vector<RosterChange> settled = roster_.settle(now);
+  follow(settled);
+  return !events.empty() || !settled.empty();
 }
 
 // Fast DDS keeps quiet about it: a writer of another type just never matches.
 void Intake::check_type(const BusEvent& event) {
   if (event.kind != BusEvent::Kind::kEndpoint || !event.endpoint.writer) return;
-  const TopicSpec* expected = topics_.spec_of(event.endpoint.topic);
-  if (expected == nullptr || event.endpoint.type == expected->type) return;
-  problems_.count(event.endpoint.topic,
-                  {InputReason::kWrongType,
-                   "announced with type " + event.endpoint.type + ", expected " + expected->type});
+  const BusEndpoint& endpoint = event.endpoint;
+  for (const InputTopic& to : topics_.find(endpoint.topic)) {
+    const TopicSpec expected = spec_of(to.stream, endpoint.topic);
+    if (endpoint.type == expected.type) continue;
+    const bool compressed = is_image(to.stream) && endpoint.type == topics::kCompressedImageType;
+    problems_.count(endpoint.topic,
+                    {InputReason::kWrongType,
+                     "has type " + endpoint.type + ", expected " + expected.type +
+                         (compressed ? "; the name of a compressed topic has to end in /compressed "
+                                       "or /compressedDepth"
+                                     : "")});
+    return;
+  }
 }
 
 void Intake::follow(const std::vector<RosterChange>& changes) {
@@ -104,7 +125,7 @@ void Intake::follow(const std::vector<RosterChange>& changes) {
       go(change);
     } else if (robots_.count(change.robot) == 0 && robots_.size() >= kMostRobots) {
       turned_away_.insert(change.robot);
-      problems_.count(robot_topic(node_.topics.depth, change.robot), "too_many_robots",
+      problems_.count(bus_name(robot_topic(node_.topics.depth, change.robot)), "too_many_robots",
                       "there are " + std::to_string(kMostRobots) + " already: not listened to", 1);
     } else {
       come(change.robot);
@@ -131,7 +152,8 @@ void Intake::come(const std::string& name) {
       meet(name, config, false);
     } catch (const InputError& error) {
       robots_.erase(name);
-      problems_.count(robot_topic(node_.topics.depth, name), "no_reader", error.what(), 1);
+      problems_.count(bus_name(robot_topic(node_.topics.depth, name)), "no_reader", error.what(),
+                      1);
       return;
     }
   }
@@ -148,31 +170,45 @@ void Intake::meet_those_turned_away() {
 }
 
 void Intake::step(bool last) {
-  follow_roster();
+  if (tf_) tf_->drain_static(transforms_, problems_);
+  const bool changed = follow_roster();
+  const auto now = std::chrono::steady_clock::now();
+  // A replay, which holds its senders back, has few robots and many reasons to go on.
+  const bool everyone = last || changed || node_.lossless || now - swept_ >= kIdle;
+  if (everyone) swept_ = now;
+  const bool moved_any = tf_ && (tf_wakeup_.take() || everyone);
+  std::vector<std::string> visited;
   for (auto& [name, robot] : robots_) {
+    if (!(robot.wakeup->take() || everyone || (moved_any && robot.input->waits()))) continue;
+    visited.push_back(name);
     const bool far_ahead = node_.lossless && merger_.pending(name) >= kMostBehind;
     robot.input->look(last        ? RobotInput::Turn::kLast
                       : far_ahead ? RobotInput::Turn::kHold
                                   : RobotInput::Turn::kUsual);
   }
   std::set<std::string> moved;
-  if (tf_) moved = tf_->drain(transforms_, problems_);
-  for (auto it = robots_.begin(); it != robots_.end();) {
-    const auto& [name, robot] = *it;
-    RobotInput& input = *robot.input;
-    input.drain(moved);
-    for (Frame& frame : input.take()) {
-      const StampNs stamp_ns = frame.stamp_ns;
-      merger_.add(name, stamp_ns, std::move(frame));
-    }
-    // A replay may be paused; who is silent on a live bus is not waited for.
-    const bool silent = !node_.lossless && input.silent_s() >= node_.silent_wait_s;
-    merger_.set_live(name, input.live() && !silent);
-    merger_.set_watermark(name, input.watermark_ns());
-    it = see_off(it->second) ? robots_.erase(it) : std::next(it);
+  if (moved_any) moved = tf_->drain(transforms_, problems_);
+  for (const std::string& name : visited) {
+    const auto robot = robots_.find(name);
+    visit(name, *robot->second.input, moved);
+    if (see_off(robot->second)) robots_.erase(robot);
   }
   hand_over(last);
-  update_status();
+  if (everyone) update_status();
+}
+
+void Intake::visit(const std::string& name, RobotInput& input, const std::set<std::string>& moved) {
+  ++visits_;
+  input.drain(moved);
+  for (Frame& frame : input.take()) {
+    const StampNs stamp_ns = frame.stamp_ns;
+    merger_.add(name, stamp_ns, std::move(frame));
+  }
+  if (merger_.pending(name) >= kMostBehind) far_ahead_.insert(name);
+  // A replay may be paused; who is silent on a live bus is not waited for.
+  const bool silent = !node_.lossless && input.silent_s() >= node_.silent_wait_s;
+  merger_.set_live(name, input.live() && !silent);
+  merger_.set_watermark(name, input.watermark_ns());
 }
 
 bool Intake::see_off(const Robot& robot) {
@@ -190,10 +226,10 @@ bool Intake::see_off(const Robot& robot) {
 
 void Intake::hand_over(bool last) {
   while (last || !node_.lossless || queue_.has_room()) {
-    const bool far_behind = std::any_of(robots_.begin(), robots_.end(), [&](const auto& robot) {
-      return merger_.pending(robot.first) >= kMostBehind;
-    });
-    std::optional<Frame> frame = merger_.take(last || far_behind);
+    for (auto name = far_ahead_.begin(); name != far_ahead_.end();) {
+      name = merger_.pending(*name) < kMostBehind ? far_ahead_.erase(name) : std::next(name);
+    }
+    std::optional<Frame> frame = merger_.take(last || !far_ahead_.empty());
     if (!frame) return;
     if (node_.lossless || last) {
       queue_.push(std::move(*frame));
@@ -207,6 +243,7 @@ void Intake::update_status() {
   IntakeStatus status;
   status.cpu_ms = thread_cpu_ms();
   status.take_cpu_ms = departed_take_cpu_ms_;
+  status.visits = visits_;
   status.departed_frames = departed_frames_;
   status.departed_dropped = departed_dropped_;
   for (const auto& [name, robot] : robots_) {
@@ -222,7 +259,7 @@ void Intake::update_status() {
       waiting = "the other robots wait for its next frame";
     }
     status.robots.push_back({name, input.live(), input.frames(), input.dropped(), input.lost(),
-                             std::move(waiting), input.images()});
+                             std::move(waiting), input.images(), input.rate_limited()});
   }
   status.departures.assign(departures_.begin(), departures_.end());
   status.problems = problems_.entries();

@@ -14,10 +14,11 @@
 #include <vector>
 
 #include "pocd/input/frame_merger.hpp"
+#include "pocd/input/input_topics.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
 #include "pocd_dds/node/frame_queue.hpp"
-#include "pocd_dds/node/input_topics.hpp"
 #include "pocd_dds/node/latency_log.hpp"
+#include "pocd_dds/node/pulse.hpp"
 #include "pocd_dds/node/robot_input.hpp"
 #include "pocd_dds/node/roster.hpp"
 
@@ -27,8 +28,9 @@ struct RobotStatus {
   std::string name;
   bool live = false;
   std::uint64_t frames = 0, dropped = 0, lost = 0;
-  std::string waiting_for;   ///< "" or what its frames wait for, or why it is not waited for
-  std::uint64_t images = 0;  ///< depth images that came
+  std::string waiting_for;         ///< "" or what its frames wait for, or why it is not waited for
+  std::uint64_t images = 0;        ///< depth images that came
+  std::uint64_t rate_limited = 0;  ///< of them, beyond node.max_frame_rate_hz
 };
 
 /// A robot that has gone, and why.
@@ -45,6 +47,7 @@ struct IntakeStatus {
   std::vector<ProblemCounter::Entry> problems;
   /// CPU time so far: taking images from the bus and converting them, and all of the thread [ms].
   double take_cpu_ms = 0.0, cpu_ms = 0.0;
+  std::uint64_t visits = 0;  ///< turns that robots' inputs got, all robots together
 };
 
 /// Runs a thread of its own from construction to stop().
@@ -53,7 +56,7 @@ class Intake {
   /// `watch` has listened on the participant from its first moment. It, `queue` and `latency` must
   /// outlive the intake. Throws InputError for a bad topic or colour.
   Intake(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-         const ClassMap& classes, BusWatch& watch, FrameQueue& queue, LatencyLog& latency);
+         const PipelineConfig& pipeline, BusWatch& watch, FrameQueue& queue, LatencyLog& latency);
   ~Intake();
 
   /// Takes what has arrived until now, hands every frame that it makes to the queue, and closes it.
@@ -66,10 +69,14 @@ class Intake {
   }
   /// A frame was taken out of the queue.
   void room_made() { wakeup_.wake(); }
+  /// As it was at most kIdle ago.
   IntakeStatus status() const;
+  /// How long the thread has not ended a turn.
+  double still_s() const { return pulse_.still_s(); }
 
  private:
   struct Robot {
+    std::unique_ptr<Wakeup> wakeup;  ///< what has arrived is this robot's
     std::unique_ptr<RobotInput> input;
     bool named = false;      ///< by the configuration: stays when it has gone
     bool announced = false;  ///< the roster has it
@@ -77,7 +84,11 @@ class Intake {
 
   void run();
   void step(bool last);
-  void follow_roster();
+  /// A robot's turn, after its look(). Who has nothing new gets one every kIdle only: a sample must
+  /// not cost a look at the whole fleet.
+  void visit(const std::string& name, RobotInput& input, const std::set<std::string>& moved);
+  /// True when something has changed.
+  bool follow_roster();
   void check_type(const BusEvent& event);
   void follow(const std::vector<RosterChange>& changes);
   void meet(const std::string& name, const RobotConfig& config, bool named);
@@ -95,18 +106,23 @@ class Intake {
   BusWatch& watch_;
   FrameQueue& queue_;
   LatencyLog& latency_;
-  Wakeup wakeup_;
-  ColourTable colours_;
+  Wakeup wakeup_, tf_wakeup_{wakeup_};
+  Pulse pulse_;
+  const LabelTable labels_;
   ProblemCounter problems_;
   const InputTopics topics_;
   Roster roster_;
   TransformTree transforms_;            ///< of the topics that all robots share
   std::unique_ptr<TransformInput> tf_;  ///< null when every robot has its own
+  const StreamContext context_;
   std::map<std::string, Robot> robots_;
   std::set<std::string> turned_away_;  ///< on the bus, but there was no room
   std::deque<RobotDeparture> departures_;
   double departed_take_cpu_ms_ = 0.0;
   std::uint64_t departed_frames_ = 0, departed_dropped_ = 0;
+  std::uint64_t visits_ = 0;
+  std::chrono::steady_clock::time_point swept_{};  ///< when all robots were last visited
+  std::set<std::string> far_ahead_;  ///< with kMostBehind frames or more that wait for others
   FrameMerger<Frame> merger_;
   std::atomic<bool> stopping_{false}, failed_{false};
   std::exception_ptr failure_;

@@ -8,12 +8,12 @@
 #include <optional>
 #include <set>
 
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/byte_budget.hpp"
-#include "pocd_dds/node/node_config.hpp"
 #include "pocd_dds/node/status_publication.hpp"
 #include "pocd_msgsPubSubTypes.h"
 

@@ -1,5 +1,6 @@
 #include "pocd_dds/node/node.hpp"
 
+#include <pthread.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -38,6 +39,7 @@ BusOptions watched(BusOptions bus, BusWatch& watch) {
 struct Node::Impl {
   explicit Impl(const NodeOptions& options)
       : config(options.config),
+        on_status(options.on_status),
         participant(std::make_shared<Participant>(watched(options.bus, watch))),
         pipeline(config.pipeline),
         latency(options.latency_file),
@@ -50,31 +52,37 @@ struct Node::Impl {
         objects(participant, config, options.epoch),
         map(participant, config, options.epoch, wakeup),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
-        intake(participant, config.node, config.pipeline.classes, watch, queue, latency),
-        worker([this] { guard([this] { work(); }); }),
-        drawer([this] { guard([this] { draw(); }); }) {}
+        health(config.node.health_window_s, config.node.stall_s),
+        intake(participant, config.node, config.pipeline, watch, queue, latency),
+        worker([this] { guard("pocd_worker", [this] { work(); }); }),
+        teller([this] { guard("pocd_teller", [this] { tell(); }); }),
+        drawer([this] { guard("pocd_drawer", [this] { draw(); }); }) {}
 
   ~Impl() {
     intake.stop();
     if (worker.joinable()) worker.join();
-    stop_drawing();
+    stop(told, tellers_wakeup, teller);
+    stop(drawn, outputs_wakeup, drawer);
   }
 
-  /// What a thread ends with is what run() throws.
-  void guard(const std::function<void()>& task);
+  /// What a thread ends with is what run() throws. Threads have names for debuggers and `top -H`.
+  void guard(const char* name, const std::function<void()>& task);
   void work();
+  void tell();
   void draw();
-  void stop_drawing();
+  static void stop(std::atomic<bool>& over, Wakeup& wakeup, std::thread& thread);
   void process(const Frame& frame);
   void publish(bool now);
   /// What is wrong on the bus beside the robots' topics.
   void add_problems(IntakeStatus& input);
-  void send_status(const std::string& state);
+  NodeState judge(const IntakeStatus& input, const WorkStatus& work, const std::string& word);
+  void send_status(const std::string& word);
   void send_outputs(bool last);
   void turn();
   bool finish();
 
   const NodeFile config;
+  const std::function<void(const NodeState&, bool)> on_status;
   BusWatch watch;  // outlives the participant
   const std::shared_ptr<Participant> participant;
   PocdPipeline pipeline;  // worker only
@@ -82,17 +90,23 @@ struct Node::Impl {
   FrameQueue queue;
   Wakeup wakeup;
 
+  // Written by the telling thread, filled by the worker; both guard themselves.
+  Wakeup tellers_wakeup;
+  std::atomic<bool> told{false};
+
   // The drawing thread only, until it has ended; but for what is thread-safe.
   Wakeup outputs_wakeup;
   RosOutputs outputs;
   NodeClock clock;  // thread-safe
   std::atomic<bool> drawn{false};
+  std::atomic<std::uint64_t> draws_failed{0};
 
   // run()'s thread only.
   RivalWatch rivals;
   ProblemCounter problems;
   Clock::time_point status_sent{};
   bool map_waits = false;
+  bool ending = false, failing = false;  // the latter by the last status
 
   // Guards everything below that several threads use; the map has a lock of its own, because only
   // its data is so large that encoding and writing it would hold up the others.
@@ -100,18 +114,23 @@ struct Node::Impl {
   FrameLog frames;
   ObjectPublication objects;
   MapPublication map;
-  StatusPublication status;
+  Pulse worker_pulse, teller_pulse;
   WorkStatus counts;
   double busy_ms = 0.0;
   std::uint64_t busy_frames = 0;
   std::exception_ptr failure;
   std::atomic<bool> failed{false}, worked{false};
 
+  // run()'s thread only; its writers are made after all others.
+  StatusPublication status;
+  HealthRule health;
+
   Intake intake;
-  std::thread worker, drawer;
+  std::thread worker, teller, drawer;
 };
 
-void Node::Impl::guard(const std::function<void()>& task) {
+void Node::Impl::guard(const char* name, const std::function<void()>& task) {
+  pthread_setname_np(pthread_self(), name);
   try {
     task();
   } catch (...) {
@@ -129,23 +148,41 @@ void Node::Impl::work() {
       process(*frame);
     }
     publish(false);
+    worker_pulse.beat();
   }
   publish(true);
   worked = true;
   wakeup.wake();
 }
 
+// Writing takes time for every subscriber: neither the pipeline nor the map waits for it.
+void Node::Impl::tell() {
+  while (!told) {
+    tellers_wakeup.wait_for(kPoll);
+    objects.send_due(false);
+    frames.send();
+    teller_pulse.beat();
+  }
+  objects.send_due(true);
+  frames.send();
+}
+
+// Nobody's work depends on these topics, so nothing that goes wrong with them ends the node.
 void Node::Impl::draw() {
   while (!drawn) {
     outputs_wakeup.wait_for(kPoll);
-    send_outputs(false);
+    try {
+      send_outputs(false);
+    } catch (const std::exception& error) {
+      if (draws_failed++ == 0) spdlog::error("topics for others: {}", error.what());
+    }
   }
 }
 
-void Node::Impl::stop_drawing() {
-  drawn = true;
-  outputs_wakeup.wake();
-  if (drawer.joinable()) drawer.join();
+void Node::Impl::stop(std::atomic<bool>& over, Wakeup& wakeup, std::thread& thread) {
+  over = true;
+  wakeup.wake();
+  if (thread.joinable()) thread.join();
 }
 
 void Node::Impl::process(const Frame& frame) {
@@ -174,14 +211,11 @@ void Node::Impl::process(const Frame& frame) {
   for (const DroppedFrame& dropped : queue.take_dropped()) frames.dropped(dropped);
   objects.add(result, frame.stamp_ns);
   counts.memory = pipeline.map().memory_status();
+  tellers_wakeup.wake();
 }
 
 void Node::Impl::publish(bool now) {
   const double cpu_ms = thread_cpu_ms();
-  {
-    const std::lock_guard<std::mutex> lock(mutex);
-    objects.send_due(now);
-  }
   // Compressed while the others go on; only this thread changes what it reads.
   const bool step = map.begin_step(now);
   std::optional<MapDelta> delta;
@@ -210,6 +244,14 @@ void Node::Impl::add_problems(IntakeStatus& input) {
   if (outputs.grid_too_large()) {
     input.problems.push_back({topics::kOccupancy.name, "grid_too_large", 1, ""});
   }
+  for (const auto& [topic, count] : outputs.broken()) {
+    input.problems.push_back({topic, "output_failed", count, ""});
+  }
+  if (draws_failed > 0) input.problems.push_back({"rt/", "output_failed", draws_failed, ""});
+  const std::uint64_t dropped_events = objects.dropped_events();
+  if (dropped_events > 0) {
+    input.problems.push_back({topics::kObjectEvents.name, "events_dropped", dropped_events, ""});
+  }
   rivals.count_problems(problems);
   map.count_problems(problems);
   clock.count_problems(problems);
@@ -217,23 +259,50 @@ void Node::Impl::add_problems(IntakeStatus& input) {
   input.problems.insert(input.problems.end(), more.begin(), more.end());
 }
 
-void Node::Impl::send_status(const std::string& state) {
+NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
+                            const std::string& word) {
+  HealthSigns signs;
+  signs.write_failures = work.write_failures;
+  signs.output_failures = outputs.failures() + draws_failed;
+  for (const auto& [topic, count] : outputs.broken()) signs.output_failures += count;
+  for (const auto& entry : input.problems) signs.problems += entry.count;
+  signs.dropped = queue.dropped();
+  const auto look = [&](const char* thread, double still_s, bool ended) {
+    if (ended || still_s <= signs.still_s) return;
+    signs.still_s = still_s;
+    signs.still_thread = thread;
+  };
+  look("the pipeline", worker_pulse.still_s(), worked);
+  look("the intake", intake.still_s(), ending);
+  look("the writer of objects", teller_pulse.still_s(), told);
+  NodeState state{word, false, signs.still_s, health.judge(signs, Clock::now())};
+  state.ready = !ending && signs.still_s < config.node.stall_s;
+  return state;
+}
+
+void Node::Impl::send_status(const std::string& word) {
   IntakeStatus input = intake.status();
   add_problems(input);
-  const std::lock_guard<std::mutex> lock(mutex);
-  counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
-  busy_ms = 0.0;
-  busy_frames = 0;
-  counts.latency_ms = latency.take_longest_ms();
-  counts.intake_cpu_ms = input.cpu_ms;
-  counts.take_cpu_ms = input.take_cpu_ms;
-  counts.process_cpu_ms = process_cpu_ms();
-  counts.write_failures =
-      objects.failures() + map.failures() + frames.failures() + outputs.failures();
-  counts.map = map.traffic();
-  counts.objects = objects.objects().size();
-  map.send_manifest(counts.objects, state == "stopped" && map.waiting() == 0);
-  status.send(input, counts, queue.size(), queue.dropped(), state, clock.now_ns());
+  WorkStatus work;
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
+    busy_ms = 0.0;
+    busy_frames = 0;
+    counts.latency_ms = latency.take_longest_ms();
+    counts.intake_cpu_ms = input.cpu_ms;
+    counts.take_cpu_ms = input.take_cpu_ms;
+    counts.process_cpu_ms = process_cpu_ms();
+    counts.write_failures = objects.failures() + map.failures() + frames.failures();
+    counts.map = map.traffic();
+    counts.objects = objects.count();
+    work = counts;
+  }
+  map.send_manifest(work.objects, word == "stopped" && map.waiting() == 0);
+  const NodeState state = judge(input, work, word);
+  failing = state.verdict.level >= 2;
+  status.send(input, work, queue.size(), queue.dropped(), state, clock.now_ns());
+  if (on_status) on_status(state, ending);
 }
 
 void Node::Impl::send_outputs(bool last) {
@@ -241,6 +310,7 @@ void Node::Impl::send_outputs(bool last) {
   {
     const std::lock_guard<std::mutex> lock(mutex);
     const auto held = map.hold();
+    const auto held_objects = objects.hold();
     outputs.collect({objects.objects(), objects.touched()},
                     {map.publisher().tiles(), map.changed()}, counts.stamp_ns, now_ns, last);
   }
@@ -266,11 +336,13 @@ void Node::Impl::turn() {
 }
 
 bool Node::Impl::finish() {
+  ending = true;
   intake.stop();
   // What is queued may take seconds: subscribers go on to hear of it, and that the node is there.
   while (!worked && !failed) turn();
   worker.join();
-  stop_drawing();
+  stop(told, tellers_wakeup, teller);
+  stop(drawn, outputs_wakeup, drawer);
   if (failure) std::rethrow_exception(failure);
   intake.rethrow();
   const auto wait =
@@ -283,14 +355,18 @@ bool Node::Impl::finish() {
                   map.waiting());
   }
   send_status("stopped");
-  send_outputs(true);
+  try {
+    send_outputs(true);
+  } catch (const std::exception& error) {
+    spdlog::error("topics for others: {}", error.what());
+  }
   const std::lock_guard<std::mutex> lock(mutex);
   // A late subscriber that asked for a snapshot just now still gets it.
   const bool acknowledged = map.waiting() == 0 && objects.wait_acknowledged(end) &&
                             map.wait_acknowledged(end) && frames.wait_acknowledged(end) &&
                             status.wait_acknowledged(end) && outputs.wait_acknowledged(end);
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
-  return acknowledged && counts.write_failures == 0;
+  return acknowledged && !failing;
 }
 
 Node::Node(const NodeOptions& options) {

@@ -3,9 +3,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 
-#include "pocd_dds/node/node_config.hpp"
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/node/status_publication.hpp"
 
 namespace pocd::dds {
@@ -15,9 +16,12 @@ struct NodeOptions {
   NodeFile config;
   std::uint64_t epoch = 0;   ///< names this run in every identifier; never 0, never used twice
   std::string latency_file;  ///< CSV of the time that each frame took; empty: none
+  /// Called with each status, about once a second, by the thread of run(); `ending`: it was asked
+  /// to stop. May be empty.
+  std::function<void(const NodeState&, bool ending)> on_status;
 };
 
-/// Owns participant, intake thread and worker thread.
+/// Owns participant and threads: intake, worker, and one each that writes objects and that draws.
 class Node {
  public:
   /// Throws InputError when the bus or the configuration cannot be used.
@@ -25,8 +29,8 @@ class Node {
   ~Node();
 
   /// Runs until `stop` is true; then stops the intake, processes what is queued, publishes the last
-  /// state and waits for subscribers to acknowledge it. False when they did not in time, or when a
-  /// sample could not be written.
+  /// state and waits for subscribers to acknowledge it. False when they did not in time, or when
+  /// samples could not be written within the last `node.health_window_s`.
   bool run(const std::atomic<bool>& stop);
 
   WorkStatus work_status() const;

@@ -1,5 +1,7 @@
 #include "pocd_dds/node/object_publication.hpp"
 
+#include <utility>
+
 namespace pocd::dds {
 
 ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& participant,
@@ -11,10 +13,12 @@ ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& partici
       events_(participant, topics::kObjectEvents) {}
 
 void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   stamp_ns_ = stamp_ns;
   for (const ObjectEvent& event : result.events) {
-    auto message = event_message(event, run_, classes_, node_.map_frame);
-    events_.write(message);
+    // A gap in their numbers, which subscribers see.
+    if (events_waiting_.size() >= kMostEvents) events_waiting_.pop_front(), ++dropped_events_;
+    events_waiting_.push_back(event);
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
     objects_[object.id] = object;
@@ -25,37 +29,80 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
     objects_.erase(id);
     changed_.erase(id);
     touched_.insert(id);
-    if (published_.erase(id) > 0) gone_.insert(id);
+    gone_.insert(id);
   }
-  dispose_gone();
+}
+
+void ObjectPublication::send_events() {
+  std::deque<ObjectEvent> events;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    events.swap(events_waiting_);
+  }
+  for (const ObjectEvent& event : events) {
+    auto message = event_message(event, run_, classes_, node_.map_frame);
+    events_.write(message);
+  }
 }
 
 void ObjectPublication::dispose_gone() {
-  for (auto id = gone_.begin(); id != gone_.end();) {
+  std::set<ObjectId> gone;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    gone.swap(gone_);
+  }
+  for (const ObjectId id : gone) {
+    if (published_.count(id) == 0) continue;  // nobody has heard of it
     pocd_msgs::msg::ObjectState state;
-    state.uuid(object_uuid(run_.epoch, *id));
-    id = states_.dispose(state) ? gone_.erase(id) : std::next(id);
+    state.uuid(object_uuid(run_.epoch, id));
+    if (states_.dispose(state)) {
+      published_.erase(id);
+      continue;
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    gone_.insert(id);
   }
 }
 
-void ObjectPublication::send_due(bool now) {
-  if (changed_.empty() && gone_.empty()) return;
+std::vector<ObjectId> ObjectPublication::take_due(bool now) {
   const auto time = std::chrono::steady_clock::now();
-  if (!now && std::chrono::duration<double>(time - last_sent_).count() < node_.object_period_s) {
-    return;
-  }
+  const double since_s = std::chrono::duration<double>(time - last_sent_).count();
+  if (!now && since_s < node_.object_period_s) return {};
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (changed_.empty()) return {};
   last_sent_ = time;
+  std::vector<ObjectId> due(changed_.begin(), changed_.end());
+  changed_.clear();
+  return due;
+}
+
+bool ObjectPublication::send_state(ObjectId id) {
+  ObjectSnapshot object;
+  StampNs stamp_ns = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto known = objects_.find(id);
+    if (known == objects_.end()) return true;  // has gone meanwhile
+    object = known->second;
+    stamp_ns = stamp_ns_;
+  }
+  auto message = object_message(object, run_, classes_, stamp_ns, node_.map_frame);
+  if (!states_.write(message)) return false;
+  published_.insert(id);
+  return true;
+}
+
+void ObjectPublication::send_due(bool now) {
+  send_events();
   // What Fast DDS refuses, because the writer is full, is tried again next time.
   dispose_gone();
-  for (auto id = changed_.begin(); id != changed_.end();) {
-    auto message = object_message(objects_.at(*id), run_, classes_, stamp_ns_, node_.map_frame);
-    if (!states_.write(message)) {
-      ++id;
-      continue;
-    }
-    published_.insert(*id);
-    id = changed_.erase(id);
+  for (const ObjectId id : take_due(now)) {
+    if (send_state(id)) continue;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (objects_.count(id) > 0) changed_.insert(id);
   }
+  // What went while its state was written.
+  dispose_gone();
 }
 
 bool ObjectPublication::wait_acknowledged(std::chrono::steady_clock::time_point end) {

@@ -2,46 +2,83 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <set>
+#include <vector>
 
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
-#include "pocd_dds/node/node_config.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
 namespace pocd::dds {
 
-/// Not thread-safe.
+/// For two threads: the one of the pipeline adds what has changed, another one writes it. Writing
+/// takes as long as there are subscribers, and nobody waits for it.
 class ObjectPublication {
  public:
   ObjectPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
                     std::uint64_t epoch);
 
-  /// Events leave at once; an object's state at most once per period.
+  // The thread of the pipeline:
+
   void add(const FrameResult& result, StampNs stamp_ns);
-  /// Sends states that are due, or all that are left with `now`.
+
+  // The thread that writes:
+
+  /// Events at once, an object's state at most once per period, or all that are left with `now`.
   void send_due(bool now);
   bool wait_acknowledged(std::chrono::steady_clock::time_point end);
 
+  // Any thread:
+
+  /// As long as it is held, objects() and touched() stay as they are.
+  [[nodiscard]] std::unique_lock<std::mutex> hold() const {
+    return std::unique_lock<std::mutex>(mutex_);
+  }
   const std::map<ObjectId, ObjectSnapshot>& objects() const { return objects_; }
   /// Objects that are new, have changed or have gone; for the reader to empty.
   std::set<ObjectId>& touched() { return touched_; }
+  std::size_t count() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return objects_.size();
+  }
   std::uint64_t failures() const { return states_.failures() + events_.failures(); }
+  /// Events that were not written because more than kMostEvents waited.
+  std::uint64_t dropped_events() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return dropped_events_;
+  }
 
  private:
+  static constexpr std::size_t kMostEvents = 10000;
+
+  void send_events();
   void dispose_gone();
+  /// Ids of objects whose state is to be written now.
+  std::vector<ObjectId> take_due(bool now);
+  bool send_state(ObjectId id);
 
   const NodeConfig node_;
   const ClassMap classes_;
   const MapRun run_;
   Writer<pocd_msgs::msg::ObjectStatePubSubType> states_;
   Writer<pocd_msgs::msg::ObjectEventPubSubType> events_;
-  std::map<ObjectId, ObjectSnapshot> objects_;
-  std::set<ObjectId> changed_, published_, gone_, touched_;
-  StampNs stamp_ns_ = 0;
+
+  // Only the thread that writes.
+  std::set<ObjectId> published_;
   std::chrono::steady_clock::time_point last_sent_{};
+
+  mutable std::mutex mutex_;  // guards what follows, and is not held while something is written
+  std::map<ObjectId, ObjectSnapshot> objects_;
+  std::set<ObjectId> changed_, gone_, touched_;
+  std::deque<ObjectEvent> events_waiting_;
+  std::uint64_t dropped_events_ = 0;
+  StampNs stamp_ns_ = 0;
 };
 
 }  // namespace pocd::dds

@@ -1,4 +1,4 @@
-// The streams of one robot: readers, checks, synchroniser.
+// The streams of one robot as they come over the bus: readers, and who is silent or has gone.
 #pragma once
 
 #include <chrono>
@@ -10,31 +10,39 @@
 #include <vector>
 
 #include "nav_msgsPubSubTypes.h"
-#include "pocd/input/frame.hpp"
-#include "pocd/input/time_synchronizer.hpp"
+#include "pocd/config/node_config.hpp"
+#include "pocd/input/robot_streams.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/bridge/image_visit.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/node/latency_log.hpp"
-#include "pocd_dds/node/node_config.hpp"
 #include "pocd_dds/node/transform_input.hpp"
 #include "sensor_msgsPubSubTypes.h"
 
 namespace pocd::dds {
+
+/// Of a topic whose name says whether its images are compressed.
+class ImageReader : public RawReader {
+ public:
+  ImageReader(const std::shared_ptr<Participant>& participant, InputStream stream,
+              const std::string& topic, bool lossless, Wakeup& wakeup);
+
+  /// Calls the visit with the oldest image not taken yet; false when there is none.
+  bool take(ImageVisit& visit, SampleMeta& meta) { return take_raw(&visit, meta); }
+};
 
 /// Used by the intake thread only. Clocks are read only to tell how long a stream has been silent.
 class RobotInput {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `shared` has the transforms of the topics that all robots share. It, `colours`, `problems`,
-  /// `wakeup` and `latency` must outlive it. Throws InputError naming the topic when there can be
-  /// no reader.
+  /// What `context` refers to, `problems` (the same counter), `wakeup` and `latency` must outlive
+  /// it. Throws InputError naming the topic when there can be no reader.
   RobotInput(const std::shared_ptr<Participant>& participant, const NodeConfig& node,
-             const RobotConfig& robot, const ColourTable& colours, const TransformTree& shared,
-             ProblemCounter& problems, Wakeup& wakeup, LatencyLog& latency);
+             const RobotConfig& robot, const StreamContext& context, ProblemCounter& problems,
+             Wakeup& wakeup, LatencyLog& latency);
 
-  const std::string& name() const { return robot_.name; }
+  const std::string& name() const { return streams_.name(); }
 
   enum class Turn {
     kUsual,
@@ -65,22 +73,24 @@ class RobotInput {
   /// How long no depth image has come although there is a source [s]; 0 without one.
   double silent_s() const;
 
-  StampNs watermark_ns() const { return synchronizer_.watermark_ns(); }
+  /// Images are waiting, for other streams or for poses.
+  bool waits() const { return streams_.synchronizer().pending() > 0; }
+  StampNs watermark_ns() const { return streams_.synchronizer().watermark_ns(); }
   /// Depth images that came, good or bad.
   std::uint64_t images() const { return images_; }
-  std::uint64_t frames() const { return frames_; }
+  std::uint64_t frames() const { return streams_.frames(); }
   /// Frames that were dropped for something they lacked.
-  std::uint64_t dropped() const;
+  std::uint64_t dropped() const { return streams_.dropped(); }
+  /// Depth images left out by node.max_frame_rate_hz.
+  std::uint64_t rate_limited() const { return streams_.rate_limited(); }
   /// Images that the bus says were lost on the way.
   std::uint64_t lost() const;
   /// CPU time that taking images from the bus and converting them took so far [ms].
   double take_cpu_ms() const { return take_cpu_ms_; }
   /// What its frames wait for, or go on without; "" when nothing is wrong.
   std::string waiting_for() const;
-  const SynchronizerCounts& counts() const { return synchronizer_.counts(); }
 
  private:
-  using ImageReader = Reader<ImageVisitType>;
   using Stream = TimeSynchronizer::Stream;
 
   /// Nothing comes after this turn: all that the readers hold is taken, and all frames come out.
@@ -89,39 +99,21 @@ class RobotInput {
   void drain_camera_info();
   void hear_transforms(const std::set<std::string>& moved);
   void drain_images(Stream stream, ImageReader& reader);
-  /// An image of a stream as the synchroniser takes it, or what is wrong with it.
-  struct ConvertedImage {
-    recording::RosHeader header;
-    cv::Mat image;
-    std::optional<InputProblem> problem;
-    std::uint64_t unknown_pixels = 0;
-  };
-  ConvertedImage convert(Stream stream, const recording::RosImage& message) const;
-  void add_image(Stream stream, ConvertedImage&& converted, std::int64_t received_ns,
-                 const std::string& topic);
-  bool accept_camera_frame(const std::string& frame, const std::string& topic);
+  void count_lost(Stream stream, const ImageReader& reader);
   void heard(Stream stream);
   void judge_silence();
   void set_patience();
-  std::string topic_of(Stream stream) const;
 
-  RobotConfig robot_;
-  const std::string map_frame_, tf_topic_;
   const bool lossless_;
   const double silent_wait_s_;
-  std::string camera_frame_;           ///< "" until the first depth image
-  std::optional<CameraModel> camera_;  ///< as its source said last
-  const ColourTable& colours_;
   ProblemCounter& problems_;
   Wakeup& wakeup_;
   LatencyLog& latency_;
-  TransformTree transforms_;
-  TimeSynchronizer synchronizer_;
-  PoseQuaternion mount_;
+  RobotStreams streams_;
   Turn turn_ = Turn::kUsual;
   bool had_source_ = false, source_left_ = false;
-  std::uint64_t frames_ = 0, images_ = 0;
-  std::uint64_t refused_ = 0;
+  std::uint64_t images_ = 0;
+  std::map<Stream, std::uint64_t> told_lost_;
   double take_cpu_ms_ = 0.0;
   bool segmentation_required_ = false, color_required_ = false;
   std::map<Stream, Clock::time_point> heard_;

@@ -2,7 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <string_view>
 
 #include "pocd/map/birdseye.hpp"
@@ -47,6 +49,7 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
     : config_(config),
       rates_(config_.node.outputs),
       obstacle_options_{source_of(epoch), rates_.level_name, rates_.obstacle_lifetime_s},
+      budget_(1e6 * rates_.rate_mb_s),
       markers_pace_(rates_.markers_hz),
       occupancy_pace_(rates_.occupancy_hz),
       surface_pace_(rates_.surface_hz),
@@ -88,8 +91,10 @@ void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
                          bool last) {
   // A topic without any reader is not worked for; who comes later gets it at the next period.
   markers_due_ = markers_ && (markers_pace_.due(now_ns) || last);
-  occupancy_due_ = grid_ && (occupancy_pace_.due(now_ns) || last);
-  surface_due_ = surface_ && surface_->matched() > 0 && (surface_pace_.due(now_ns) || last);
+  const bool room = budget_.open(std::chrono::steady_clock::now());
+  occupancy_due_ = grid_ && ((room && occupancy_pace_.due(now_ns)) || last);
+  surface_due_ =
+      surface_ && surface_->matched() > 0 && ((room && surface_pace_.due(now_ns)) || last);
   obstacles_due_ = obstacles_ && obstacles_pace_.due(now_ns) && !last;
   stamp_ns_ = stamp_ns;
   now_ns_ = now_ns;
@@ -111,11 +116,34 @@ void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
   if (!grid_ && !surface_) tiles.keys.clear();
 }
 
+template <class AnyWriter>
+bool RosOutputs::attempt(const std::unique_ptr<AnyWriter>& writer, void (RosOutputs::*send_one)()) {
+  std::string why;
+  try {
+    (this->*send_one)();
+    return true;
+  } catch (const std::exception& error) {
+    why = error.what();
+  } catch (...) {
+    why = "unknown exception";
+  }
+  const std::lock_guard<std::mutex> lock(broken_mutex_);
+  if (broken_[writer->topic()]++ == 0) {
+    spdlog::error("{}: could not be made: {} (logged once, counted)", writer->topic(), why);
+  }
+  return false;
+}
+
+void RosOutputs::spend(const RawWriter& writer, std::size_t bytes) {
+  budget_.spend(bytes * static_cast<std::size_t>(std::max(writer.matched(), 0)));
+}
+
 void RosOutputs::send() {
-  if (markers_due_) send_markers();
-  if (obstacles_due_) send_obstacles();
-  if (occupancy_due_) send_occupancy();
-  if (surface_due_) send_surface();
+  // After a failure the next one says all that there is.
+  if (markers_due_ && !attempt(markers_, &RosOutputs::send_markers)) all_markers_anew_ = true;
+  if (obstacles_due_) attempt(obstacles_, &RosOutputs::send_obstacles);
+  if (occupancy_due_ && !attempt(grid_, &RosOutputs::send_occupancy)) grid_unsent_ = true;
+  if (surface_due_ && !attempt(surface_, &RosOutputs::send_surface)) surface_unsent_ = true;
   markers_due_ = obstacles_due_ = occupancy_due_ = surface_due_ = false;
 }
 
@@ -169,9 +197,11 @@ void RosOutputs::send_occupancy() {
   if (resized || grid_unsent_ || (grid_outdated_ && (readers != grid_readers_ || last_))) {
     auto message = grid_message(projection_.grid(), config_.pipeline.map.voxel_size_m, stamp_ns_,
                                 config_.node.map_frame);
+    spend(*grid_, message.data().size());
     grid_outdated_ = grid_unsent_ = !grid_->write(message);
   } else if (rectangle) {
     auto message = grid_update_message(*rectangle, stamp_ns_, config_.node.map_frame);
+    spend(*grid_updates_, message.data().size());
     grid_unsent_ = !grid_updates_->write(message);
   }
   grid_readers_ = readers;
@@ -186,6 +216,7 @@ void RosOutputs::send_surface() {
   auto message = cloud_message(points_, appearance_by_stationarity(objects),
                                static_cast<std::size_t>(rates_.surface_points), stamp_ns_,
                                config_.node.map_frame);
+  spend(*surface_, message.data().size());
   surface_unsent_ = !surface_->write(message);
 }
 

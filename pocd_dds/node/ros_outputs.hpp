@@ -5,15 +5,18 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <set>
+#include <string>
 
 #include "map_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/bridge/ros_messages.hpp"
 #include "pocd_dds/entities/writer.hpp"
+#include "pocd_dds/node/byte_budget.hpp"
 #include "pocd_dds/node/node_clock.hpp"
-#include "pocd_dds/node/node_config.hpp"
 #include "rmf_obstacle_msgsPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"
@@ -37,6 +40,8 @@ class RosOutputs {
   /// copied; with `last`, the final state for those that keep one.
   void collect(const Changes<ObjectId, ObjectSnapshot>& objects,
                const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns, bool last);
+  /// What fails is counted and tried again at its next period; nothing is thrown. A cloud or a grid
+  /// is sent when those before it have left at `outputs.rate_mb_s`.
   void send();
   /// Of the topics that keep their last state.
   bool wait_acknowledged(std::chrono::steady_clock::time_point end);
@@ -44,12 +49,21 @@ class RosOutputs {
   std::uint64_t failures() const;
   /// The grid is not published: tiles are too far apart. Thread-safe.
   bool grid_too_large() const { return grid_too_large_; }
+  /// Messages that could not be made, by topic. Thread-safe.
+  std::map<std::string, std::uint64_t> broken() const {
+    const std::lock_guard<std::mutex> lock(broken_mutex_);
+    return broken_;
+  }
 
  private:
   void send_markers();
   void send_obstacles();
   void send_occupancy();
   void send_surface();
+  /// Runs one of the above. False: what it has thrown is counted under the topic.
+  template <class AnyWriter>
+  bool attempt(const std::unique_ptr<AnyWriter>& writer, void (RosOutputs::*send_one)());
+  void spend(const RawWriter& writer, std::size_t bytes);
   void copy_tiles(const Changes<TileKey, MapTile>& tiles);
 
   const NodeFile config_;
@@ -60,6 +74,7 @@ class RosOutputs {
   std::unique_ptr<Writer<map_msgs::msg::OccupancyGridUpdatePubSubType>> grid_updates_;
   std::unique_ptr<Writer<sensor_msgs::msg::PointCloud2PubSubType>> surface_;
   std::unique_ptr<Writer<rmf_obstacle_msgs::msg::ObstaclesPubSubType>> obstacles_;
+  ByteBudget budget_;  // of clouds and grids, which have no parts
   Pace markers_pace_, occupancy_pace_, surface_pace_, obstacles_pace_;
 
   // What collect() took for send().
@@ -81,6 +96,9 @@ class RosOutputs {
   bool grid_unsent_ = false;    // the last message was refused
   SurfacePoints points_;
   bool surface_unsent_ = false;
+
+  mutable std::mutex broken_mutex_;
+  std::map<std::string, std::uint64_t> broken_;
 };
 
 }  // namespace pocd::dds

@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "pocd_dds/node/input_delivery.hpp"
+
 namespace pocd::dds {
 namespace {
 
@@ -16,11 +18,10 @@ std::string lease_text(double lease_s) {
 
 }  // namespace
 
-Roster::Roster(const NodeConfig& node) : discovers_(node.discovers()), pattern_(node.topics.depth) {
+Roster::Roster(const NodeConfig& node)
+    : discovers_(node.discovers()), pattern_(bus_name(node.topics.depth)) {
   for (const RobotConfig& robot : node.robots) {
-    const std::string topic =
-        robot.depth_topic.empty() ? robot_topic(pattern_, robot.name) : robot.depth_topic;
-    named_[topic] = robot.name;
+    named_[topic_of(node, robot, InputStream::kDepth)] = robot.name;
     names_.insert(robot.name);
   }
 }
@@ -65,7 +66,7 @@ std::vector<RosterChange> Roster::hear(const BusEvent& event, Clock::time_point 
       if (!endpoint.writer) break;
       const std::string robot = robot_of(endpoint.topic);
       if (robot.empty()) break;
-      if (endpoint.type != topics::kDepth.type) break;
+      if (endpoint.type != spec_of(InputStream::kDepth, endpoint.topic).type) break;
       if (!writers_.emplace(endpoint.key, Writer{robot, event.participant}).second) break;
       if (leaving_.erase(robot) > 0) changes.push_back({robot, false, kTakenBack});
       if (++writers_of_[robot] == 1) changes.push_back({robot, true, ""});

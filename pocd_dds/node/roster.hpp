@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "pocd/config/node_config.hpp"
 #include "pocd_dds/entities/bus_watch.hpp"
-#include "pocd_dds/node/node_config.hpp"
 
 namespace pocd::dds {
 

@@ -84,17 +84,17 @@ StatusPublication::StatusPublication(const std::shared_ptr<Participant>& partici
 }
 
 void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
-                             std::uint64_t queue_dropped, const std::string& state,
-                             StampNs now_ns) {
+                             std::uint64_t queue_dropped, const NodeState& state, StampNs now_ns) {
   pocd_msgs::msg::NodeHealth health;
   health.node(node_key(epoch_));
   health.stamp(to_time(wall_clock_ns()));
   health.name(name_);
   health.version(POCD_VERSION);
   health.epoch(epoch_);
-  const bool failing = work.write_failures > 0;
-  health.level(failing ? kError : intake.problems.empty() && queue_dropped == 0 ? kOk : kWarning);
-  health.message(failing ? "samples could not be written" : state);
+  health.level(state.verdict.level);
+  health.message(state.verdict.level >= kError ? state.verdict.why : state.word);
+  health.ready(state.ready);
+  health.still_s(state.still_s);
   health.frames_processed(work.processed);
   health.frames_refused(work.refused);
   health.queue_length(static_cast<std::uint32_t>(queued));
@@ -104,7 +104,8 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
 
   diagnostic_msgs::msg::DiagnosticArray diagnostics;
   diagnostics.header().stamp(to_time(now_ns));
-  auto node = status_of(health.level(), name_, health.message());
+  auto node =
+      status_of(health.level(), name_, state.verdict.why.empty() ? state.word : state.verdict.why);
   // Sums only grow: alarms look at how fast.
   std::uint64_t received = intake.departed_frames;
   std::uint64_t dropped = queue_dropped + intake.departed_dropped;
@@ -126,6 +127,9 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     add(status, "frames", std::to_string(robot.frames));
     add(status, "frames dropped as incomplete", std::to_string(robot.dropped));
     add(status, "images lost on the bus", std::to_string(robot.lost));
+    if (robot.rate_limited > 0) {
+      add(status, "images beyond node.max_frame_rate_hz", std::to_string(robot.rate_limited));
+    }
     diagnostics.status().push_back(status);
   }
   for (const RobotDeparture& departure : intake.departures) {
@@ -146,6 +150,9 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     health.problems().push_back(problem);
     add(node, entry.topic + ": " + entry.reason, std::to_string(entry.count));
   }
+  add(node, "ready", state.ready ? "yes" : "no");
+  add(node, "longest time without a turn of a thread [s]", fixed(state.still_s));
+  add(node, "samples not written", std::to_string(work.write_failures));
   add(node, "frames received", std::to_string(received));
   add(node, "frames processed", std::to_string(work.processed));
   add(node, "frames refused", std::to_string(work.refused));
@@ -180,7 +187,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   if (!diagnostics_) return;
   // Health keeps its own rhythm of about a second, so the first one that is not much too early.
   const double since_s = std::chrono::duration<double>(now - diagnostics_sent_).count();
-  if (since_s < diagnostics_period_s_ - 0.5 && state == "running") return;
+  if (since_s < diagnostics_period_s_ - 0.5 && state.word == "running") return;
   diagnostics_sent_ = now;
   diagnostics_->write(diagnostics);
 }

@@ -9,6 +9,7 @@
 #include "diagnostic_msgsPubSubTypes.h"
 #include "pocd/map/map_memory.hpp"
 #include "pocd_dds/entities/writer.hpp"
+#include "pocd_dds/node/health_rule.hpp"
 #include "pocd_dds/node/intake.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
@@ -23,6 +24,14 @@ struct MapTraffic {
   std::uint64_t step_bytes = 0, snapshot_bytes = 0;  ///< payload sent since the start
   std::uint64_t snapshots = 0;
   std::size_t waiting = 0;  ///< messages that the rate holds back
+};
+
+/// How the node is.
+struct NodeState {
+  std::string word = "running";  ///< or "stopped"
+  bool ready = false;
+  double still_s = 0.0;  ///< of the slowest thread
+  HealthVerdict verdict;
 };
 
 /// What the worker knows.
@@ -53,7 +62,7 @@ class StatusPublication {
 
   /// Health is stamped by the wall clock, diagnostics with `now_ns`, the time of their readers.
   void send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
-            std::uint64_t queue_dropped, const std::string& state, StampNs now_ns);
+            std::uint64_t queue_dropped, const NodeState& state, StampNs now_ns);
   /// Health only: it says how the node ended.
   bool wait_acknowledged(std::chrono::steady_clock::time_point end) {
     return health_.wait_acknowledged(end);

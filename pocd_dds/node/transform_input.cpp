@@ -1,7 +1,8 @@
 #include "pocd_dds/node/transform_input.hpp"
 
+#include "pocd/input/robot_streams.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
-#include "pocd_dds/node/input_topics.hpp"
+#include "pocd_dds/node/input_delivery.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -18,7 +19,7 @@ TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
 }
 
 std::set<std::string> TransformInput::drain(TransformTree& tree, ProblemCounter& problems) {
-  drain(static_, true, tree, problems);
+  drain_static(tree, problems);
   return drain(moving_, false, tree, problems);
 }
 
@@ -29,16 +30,9 @@ std::set<std::string> TransformInput::drain(TfReader& reader, bool is_static, Tr
   reader.take_some(kMostMessages, [&](const auto& message, const SampleMeta& meta) {
     if (!meta.valid) return;
     for (const auto& entry : message.transforms()) {
-      const Checked<StampedTransform> transform = transform_from(entry);
-      if (!transform.value) {
-        problems.count(reader.topic(), *transform.problem);
-        continue;
-      }
-      const auto& [parent, child, stamp_ns, T] = *transform.value;
-      if (!is_static) moved.insert(child);
-      const std::optional<InputProblem> problem =
-          is_static ? tree.set_static(parent, child, T) : tree.add(parent, child, stamp_ns, T);
-      if (problem) problems.count(reader.topic(), *problem);
+      const std::string child =
+          add_transform(transform_from(entry), is_static, reader.topic(), tree, problems);
+      if (!is_static && !child.empty()) moved.insert(child);
     }
   });
   problems.count_damaged(reader);

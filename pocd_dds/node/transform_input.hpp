@@ -21,6 +21,10 @@ class TransformInput {
 
   /// Puts what has arrived into the tree. The child frames of what moves.
   std::set<std::string> drain(TransformTree& tree, ProblemCounter& problems);
+  /// Only what does not move: may be done at any time.
+  void drain_static(TransformTree& tree, ProblemCounter& problems) {
+    drain(static_, true, tree, problems);
+  }
 
  private:
   using TfReader = Reader<tf2_msgs::msg::TFMessagePubSubType>;

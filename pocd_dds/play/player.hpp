@@ -8,10 +8,10 @@
 #include <optional>
 #include <string>
 
+#include "pocd/config/node_config.hpp"
 #include "pocd/datasets/dataset_reader.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/writer.hpp"
-#include "pocd_dds/node/node_config.hpp"
 #include "rosgraph_msgsPubSubTypes.h"
 
 namespace pocd::dds {

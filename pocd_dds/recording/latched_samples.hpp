@@ -53,7 +53,7 @@ class LatchedSamples {
 
  private:
   // The depth of a writer's history is not announced. What is large, grids and maps, has depth 1.
-  static constexpr std::size_t kMostSamples = 100, kMostBytes = 1u << 20, kMostWriters = 100;
+  static constexpr std::size_t kMostSamples = 100, kMostBytes = 1u << 20, kMostWriters = 1000;
 
   struct Kept {
     std::optional<QueuedSample> instance;

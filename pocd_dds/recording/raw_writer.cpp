@@ -51,7 +51,7 @@ PayloadWriter::PayloadWriter(std::shared_ptr<Participant> participant, const Rec
   delivery.transient_local = topic.transient_local;
   // How much the original kept is not announced on the bus. A latched topic without keys
   // (tf_static) may have several senders' worth.
-  constexpr int kLatched = 100, kRecent = 10;
+  constexpr int kLatched = 1000, kRecent = 10;
   if (topic.transient_local) {
     delivery.keep_last = topic.keyed ? 1 : kLatched;
   } else {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "embedded_idl.hpp"
 #include "pocd/recording/cdr.hpp"
 
 namespace pocd::dds {
@@ -34,13 +33,31 @@ std::string offered_qos_profiles(const RecordedTopic& topic) {
          "  avoid_ros_namespace_conventions: false";
 }
 
-/// Value behind "key:" in lines of text, "" when there is none.
+/// Values behind "key:" in lines of text, one for each writer, without quotes.
+std::vector<std::string> values_of(const std::string& text, const std::string& key) {
+  std::vector<std::string> values;
+  for (std::size_t at = 0; (at = text.find(key + ":", at)) != std::string::npos;) {
+    at = text.find_first_not_of(" \"'", at + key.size() + 1);
+    if (at == std::string::npos) break;
+    values.push_back(text.substr(at, text.find_first_of(" \"',}\r\n", at) - at));
+  }
+  return values;
+}
 std::string value_of(const std::string& text, const std::string& key) {
-  std::size_t at = text.find(key + ":");
-  if (at == std::string::npos) return "";
-  at = text.find_first_not_of(' ', at + key.size() + 1);
-  if (at == std::string::npos) return "";
-  return text.substr(at, text.find_first_of(" \r\n", at) - at);
+  const std::vector<std::string> values = values_of(text, key);
+  return values.empty() ? "" : values.front();
+}
+
+/// rosbag2 wrote numbers up to Iron, and names since Jazzy.
+bool any_is(const std::vector<std::string>& values, const char* number, const char* name) {
+  return std::any_of(values.begin(), values.end(),
+                     [&](const std::string& value) { return value == number || value == name; });
+}
+
+/// Topics that everybody latches, for recordings that say nothing.
+bool is_latched_by_custom(const std::string& topic) {
+  const std::string last = topic.substr(topic.rfind('/') + 1);
+  return last == "tf_static" || last == "robot_description" || last == "map";
 }
 
 std::string metadata(const RecordedChannel& channel, const std::string& key) {
@@ -56,10 +73,18 @@ void read_qos(const RecordedChannel& channel, RecordedTopic& topic) {
     topic.transient_local = value_of(qos, "durability") == "true";
     topic.exclusive = value_of(qos, "ownership") == "true";
     topic.keyed = value_of(qos, "keyed") == "true";
-  } else if (!offered.empty()) {
-    topic.reliable = value_of(offered, "reliability") != "2";
-    topic.transient_local = value_of(offered, "durability") == "1";
+    return;
   }
+  // Of several writers, what satisfies most readers.
+  const std::vector<std::string> reliability = values_of(offered, "reliability");
+  const std::vector<std::string> durability = values_of(offered, "durability");
+  const auto best_effort = [](const std::string& value) {
+    return value == "2" || value == "best_effort";
+  };
+  topic.reliable =
+      reliability.empty() || !std::all_of(reliability.begin(), reliability.end(), best_effort);
+  topic.transient_local = durability.empty() ? is_latched_by_custom(channel.topic)
+                                             : any_is(durability, "1", "transient_local");
 }
 
 /// "a|b", or "guid:a|b;guid:a|b" as eProsima's recorder writes them.
@@ -77,17 +102,6 @@ std::vector<std::string> read_partitions(std::string text) {
 }
 
 }  // namespace
-
-const recording::IdlLibrary& known_types() {
-  static const recording::IdlLibrary library(embedded_idl());
-  return library;
-}
-
-std::string plain_type(const std::string& dds_type) {
-  const std::size_t at = dds_type.find("::dds_::");
-  if (at == std::string::npos || dds_type.back() != '_') return dds_type;
-  return dds_type.substr(0, at + 2) + dds_type.substr(at + 8, dds_type.size() - at - 9);
-}
 
 KeyOf key_of(const std::string& dds_type) {
   const std::string plain = plain_type(dds_type);
@@ -171,6 +185,11 @@ std::pair<InstanceChange, InstanceKey> parse_instance(const std::uint8_t* data, 
   const std::uint8_t* bytes = in.bytes(key.size());
   std::copy_n(bytes, key.size(), key.begin());
   return {static_cast<InstanceChange>(change), key};
+}
+
+bool is_of_the_ros_graph(const std::string& dds_topic) {
+  return dds_topic == "ros_discovery_info" || dds_topic.compare(0, 3, "rq/") == 0 ||
+         dds_topic.compare(0, 3, "rr/") == 0;
 }
 
 bool topic_matches(const std::string& pattern, const RecordedTopic& topic) {

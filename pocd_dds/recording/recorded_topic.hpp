@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pocd/recording/idl_schema.hpp"
 #include "pocd/recording/recording_reader.hpp"
+#include "pocd_dds/entities/known_types.hpp"
 #include "pocd_dds/recording/raw_type.hpp"
 
 namespace pocd::dds {
@@ -23,10 +23,6 @@ struct RecordedTopic {
   std::vector<std::string> partitions;
 };
 
-/// The types whose IDL is part of this program.
-const recording::IdlLibrary& known_types();
-/// "nav_msgs::msg::dds_::Odometry_" -> "nav_msgs::msg::Odometry"; other names stay.
-std::string plain_type(const std::string& dds_type);
 /// How to tell the instances of a type; empty when its IDL is not known.
 KeyOf key_of(const std::string& dds_type);
 
@@ -50,6 +46,9 @@ enum class InstanceChange : std::uint8_t { kWritten = 0, kDisposed = 1, kUnregis
 recording::Bytes instance_payload(InstanceChange change, const InstanceKey& key);
 /// Throws DamagedData.
 std::pair<InstanceChange, InstanceKey> parse_instance(const std::uint8_t* data, std::size_t size);
+
+/// ROS 2's own bookkeeping and services: played again, they would make nodes that are not there.
+bool is_of_the_ros_graph(const std::string& dds_topic);
 
 /// Shell pattern (*, ?, [..]) against the recorded name or the name on the bus.
 bool topic_matches(const std::string& pattern, const RecordedTopic& topic);

@@ -197,6 +197,14 @@ void Recorder::Impl::consider(const RecordedTopic& topic) {
       std::any_of(options.exclude.begin(), options.exclude.end(), matches)) {
     return;
   }
+  const auto named = [&](const std::string& pattern) { return pattern != "*" && matches(pattern); };
+  if (is_of_the_ros_graph(topic.name) &&
+      std::none_of(options.topics.begin(), options.topics.end(), named)) {
+    if (refused.insert(topic.name).second) {
+      spdlog::info("{}: is left out (--topic records it)", topic.name);
+    }
+    return;
+  }
   const auto [entry, fresh] = lines.try_emplace({topic.name, topic.partitions});
   Line& line = entry->second;
   if (!fresh) {
@@ -319,6 +327,10 @@ void Recorder::Impl::write_all() {
     }
     const std::lock_guard<std::mutex> lock(writer_mutex);
     writer.close();
+    if (!writer.listed()) {
+      spdlog::warn("metadata.yaml beside {} lists other files: rosbag2 will not find these",
+                   options.output.string());
+    }
   } catch (...) {
     failure = std::current_exception();
     failed = true;

@@ -28,6 +28,16 @@ void ReplayTopics::refuse_typos() const {
     if (known) continue;
     throw InputError("--topics " + pattern + ": matches none of " + names(recorded_, of_topic));
   }
+  for (const auto* patterns : {&options_.latch, &options_.no_latch}) {
+    for (const std::string& pattern : *patterns) {
+      const bool known = std::any_of(played_.begin(), played_.end(), [&](const auto& entry) {
+        return topic_matches(pattern, entry.second);
+      });
+      if (known) continue;
+      throw InputError((patterns == &options_.latch ? "--latch " : "--no-latch ") + pattern +
+                       ": matches no topic that is played, only " + names(played_, of_entry));
+    }
+  }
   for (const auto& [from, to] : options_.remap) {
     const bool known =
         std::any_of(played_.begin(), played_.end(),
@@ -47,8 +57,12 @@ void ReplayTopics::refuse_typos() const {
 }
 
 bool ReplayTopics::selected(const RecordedTopic& topic) const {
-  return options_.topics.empty() ||
-         std::any_of(options_.topics.begin(), options_.topics.end(),
+  if (options_.topics.empty()) {
+    const bool graph = is_of_the_ros_graph(topic.name);
+    if (graph) spdlog::info("{}: is left out (--topics plays it)", topic.name);
+    return !graph;
+  }
+  return std::any_of(options_.topics.begin(), options_.topics.end(),
                      [&](const std::string& pattern) { return topic_matches(pattern, topic); });
 }
 
@@ -66,7 +80,15 @@ void ReplayTopics::add(const recording::RecordedChannel& channel) {
   if (!topic) return;
   recorded_.push_back(*topic);
   if (!selected(*topic)) return;
-  const auto [entry, fresh] = played_.try_emplace({topic->name, topic->partitions}, *topic);
+  RecordedTopic offered = *topic;
+  const auto matches = [&](const std::string& pattern) { return topic_matches(pattern, *topic); };
+  if (std::any_of(options_.latch.begin(), options_.latch.end(), matches)) {
+    offered.transient_local = offered.reliable = true;
+  }
+  if (std::any_of(options_.no_latch.begin(), options_.no_latch.end(), matches)) {
+    offered.transient_local = false;
+  }
+  const auto [entry, fresh] = played_.try_emplace({topic->name, topic->partitions}, offered);
   if (!fresh && entry->second.type != topic->type) {
     spdlog::warn("{}: recorded with two types, {} and {}; only the first is played", topic->name,
                  entry->second.type, topic->type);

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "pocd/common/check.hpp"
+#include "pocd/recording/recording_files.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/recording/keyboard.hpp"
@@ -66,6 +67,7 @@ struct Replayer::Impl {
   void select(RecordingReader& reader, bool latched_only) const;
   std::string waiting() const;
   bool wait_for_readers(const std::atomic<bool>& stop);
+  void report_problems(std::size_t file, const RecordingReader& reader);
   void play_pass(const std::atomic<bool>& stop);
   void play_latched(RecordingReader& reader, std::uint64_t before_ns,
                     const std::atomic<bool>& stop);
@@ -76,7 +78,8 @@ struct Replayer::Impl {
 
   ReplayOptions options;
   std::shared_ptr<Participant> participant;
-  std::vector<std::filesystem::path> files;
+  recording::RecordingFiles files;
+  std::vector<std::uint64_t> told;  // problems of each file
   ReplayTopics topics;
   std::map<ReplayTopics::Key, std::unique_ptr<PayloadWriter>> writers;
   std::vector<Route> routes;  // of the file being played, by channel
@@ -89,24 +92,26 @@ struct Replayer::Impl {
 };
 
 Replayer::Impl::Impl(const ReplayOptions& replay_options)
-    : options(replay_options), topics(options), pace(options.speed), keyboard(options.keyboard) {
-  for (const auto& input : options.inputs) {
-    for (const auto& file : recording::recording_files(input)) files.push_back(file);
-  }
-  if (files.empty()) throw InputError("no recording given");
+    : options(replay_options),
+      files(options.inputs),
+      told(files.size()),
+      topics(options),
+      pace(options.speed),
+      keyboard(options.keyboard) {
+  if (files.size() == 0) throw InputError("no recording given");
   bool first = true;
-  for (const auto& file : files) {
-    const auto reader = recording::open_recording(file);
-    for (const std::string& problem : reader->problems()) spdlog::warn("{}", problem);
-    for (const RecordedChannel& channel : reader->channels()) topics.add(channel);
-    if (first && reader->info().messages > 0) {
-      start_ns = reader->info().start_ns;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const RecordingReader& reader = files.reader(i);
+    report_problems(i, reader);
+    for (const RecordedChannel& channel : reader.channels()) topics.add(channel);
+    if (first && reader.info().messages > 0) {
+      start_ns = reader.info().start_ns;
       first = false;
     }
   }
   topics.refuse_typos();
   if (topics.played().empty()) {
-    throw InputError(files.front().string() + ": holds no topic that can be played");
+    throw InputError(files.path(0).string() + ": holds no topic that can be played");
   }
   participant = std::make_shared<Participant>(options.bus);
   if (options.clock && topics.played().count({"rt/clock", {}}) == 0) {
@@ -114,6 +119,15 @@ Replayer::Impl::Impl(const ReplayOptions& replay_options)
         std::make_unique<Writer<rosgraph_msgs::msg::ClockPubSubType>>(participant, topics::kClock);
   }
   make_writers();
+}
+
+/// Each once, however often the file is played.
+void Replayer::Impl::report_problems(std::size_t file, const RecordingReader& reader) {
+  const auto& problems = reader.problems();
+  for (std::size_t i = told[file]; i < problems.size(); ++i) spdlog::warn("{}", problems[i]);
+  if (reader.problem_count() <= told[file]) return;
+  result.problems += reader.problem_count() - told[file];
+  told[file] = reader.problem_count();
 }
 
 void Replayer::Impl::make_writers() {
@@ -260,16 +274,16 @@ void Replayer::Impl::play_pass(const std::atomic<bool>& stop) {
       options.duration_s ? from_ns + static_cast<std::uint64_t>(*options.duration_s * 1e9)
                          : std::numeric_limits<std::uint64_t>::max();
   paced = false;
-  for (const auto& file : files) {
-    const auto reader = recording::open_recording(file);
-    if (reader->info().start_ns > until_ns) continue;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    RecordingReader& reader = files.reader(i);
+    if (reader.info().start_ns > until_ns) continue;
     routes.clear();
     // A late start misses nothing that a late joiner would have got.
-    if (options.start_s > 0.0) play_latched(*reader, from_ns, stop);
-    select(*reader, false);
-    reader->seek(from_ns);
+    if (options.start_s > 0.0) play_latched(reader, from_ns, stop);
+    select(reader, false);
+    reader.seek(from_ns);
     RecordedMessage message;
-    while (!stop && reader->next(message) && message.log_time_ns <= until_ns) {
+    while (!stop && reader.next(message) && message.log_time_ns <= until_ns) {
       if (!paced) pace.start(message.log_time_ns);
       paced = true;
       wait_until_due(message.log_time_ns, stop);
@@ -280,13 +294,12 @@ void Replayer::Impl::play_pass(const std::atomic<bool>& stop) {
         clock->write(now);
       }
       const auto before = Clock::now();
-      send(*reader, message, stop);
+      send(reader, message, stop);
       // A barrier took its time from everybody.
       const auto took = Clock::now() - before;
       if (took > kPoll) pace.shift(took);
     }
-    for (const std::string& problem : reader->problems()) spdlog::warn("{}", problem);
-    result.problems += reader->problem_count();
+    report_problems(i, reader);
     if (stop) return;
   }
 }

@@ -19,7 +19,9 @@ struct ReplayOptions {
   BusOptions bus;
   std::vector<std::filesystem::path> inputs;  ///< files or folders, one after the other
   std::vector<std::string> topics;            ///< patterns; empty: all
-  std::map<std::string, std::string> remap;   ///< recorded name -> name, both as recorded
+  /// Patterns of topics that are played latched (transient local), or not, whatever was recorded.
+  std::vector<std::string> latch, no_latch;
+  std::map<std::string, std::string> remap;  ///< recorded name -> name, both as recorded
   /// Multiple of the original speed; nothing: as fast as possible.
   std::optional<double> speed = 1.0;
   /// Every reader has a sample before the next one of its topic is sent; best effort topics become

@@ -249,7 +249,7 @@ class Run {
 
   const Options options_;
   const TemporaryFolder folder_;
-  dds::NodeFile config_;
+  NodeFile config_;
   std::optional<Site> site_;
   DriveLoad load_;
   std::optional<SitePublisher> publisher_;

@@ -69,7 +69,7 @@ DriveLoad drive_load(Site& site, double map_period_s, double object_period_s) {
   return load;
 }
 
-SitePublisher::SitePublisher(Site& site, const dds::NodeFile& config, const dds::BusOptions& bus)
+SitePublisher::SitePublisher(Site& site, const NodeFile& config, const dds::BusOptions& bus)
     : site_(site),
       config_(config),
       participant_(std::make_shared<dds::Participant>(bus)),
@@ -114,7 +114,7 @@ void SitePublisher::write_objects(const DriveLoad& load, int robots, double seco
     result.events.push_back(event);
   }
   objects_.add(result, stamp_ns);
-  objects_.send_due(false);
+  tellers_wakeup_.wake();
 }
 
 void SitePublisher::change_map(const DriveLoad& load, int robots) {
@@ -144,12 +144,9 @@ void SitePublisher::send_status(int robots) {
   }
   dds::WorkStatus work;
   work.map = map_.traffic();
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    work.objects = objects_.objects().size();
-  }
+  work.objects = objects_.count();
   map_.send_manifest(work.objects, false);
-  status_.send(input, work, 0, 0, "running", wall_ns());
+  status_.send(input, work, 0, 0, dds::NodeState{}, wall_ns());
 }
 
 void SitePublisher::work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots) {
@@ -160,14 +157,18 @@ void SitePublisher::work(const std::atomic<bool>& stopping, const DriveLoad& loa
     tick = std::max(tick + kTick, Clock::now() - kMostTicksLate * kTick);
     std::this_thread::sleep_until(tick);
     const StampNs stamp_ns = wall_ns() - std::chrono::nanoseconds(Clock::now() - tick).count();
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      write_objects(load, robots, seconds(tick - ticked), stamp_ns);
-      ticked = tick;
-    }
+    write_objects(load, robots, seconds(tick - ticked), stamp_ns);
+    ticked = tick;
     if (!map_.begin_step(false)) continue;
     map_.send_step(map_.make_step(site_.pipeline().map()), stamp_ns);
     change_map(load, robots);
+  }
+}
+
+void SitePublisher::tell(const std::atomic<bool>& stopping) {
+  while (!stopping) {
+    tellers_wakeup_.wait_for(kTick);
+    objects_.send_due(false);
   }
 }
 
@@ -176,8 +177,8 @@ void SitePublisher::draw(const std::atomic<bool>& stopping) {
     std::this_thread::sleep_for(kTick);
     const StampNs now_ns = wall_ns();
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
       const auto held = map_.hold();
+      const auto held_objects = objects_.hold();
       outputs_.collect({objects_.objects(), objects_.touched()},
                        {map_.publisher().tiles(), map_.changed()}, now_ns, now_ns, false);
     }
@@ -187,7 +188,7 @@ void SitePublisher::draw(const std::atomic<bool>& stopping) {
 
 void SitePublisher::serve(const std::function<bool()>& done, const DriveLoad& load, int robots) {
   std::atomic<bool> stopping{false};
-  std::thread worker, drawer([&] { draw(stopping); });
+  std::thread worker, teller([&] { tell(stopping); }), drawer([&] { draw(stopping); });
   if (robots > 0) worker = std::thread([&] { work(stopping, load, robots); });
   auto told = Clock::time_point{};
   while (!done()) {
@@ -198,6 +199,7 @@ void SitePublisher::serve(const std::function<bool()>& done, const DriveLoad& lo
   }
   stopping = true;
   drawer.join();
+  teller.join();
   if (worker.joinable()) worker.join();
 }
 

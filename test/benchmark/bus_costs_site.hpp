@@ -33,7 +33,7 @@ DriveLoad drive_load(Site& site, double map_period_s, double object_period_s);
 /// thread that writes what is new, one that sends, and one for the topics of ROS 2 tools.
 class SitePublisher {
  public:
-  SitePublisher(Site& site, const dds::NodeFile& config, const dds::BusOptions& bus);
+  SitePublisher(Site& site, const NodeFile& config, const dds::BusOptions& bus);
 
   /// Map and objects as they are, for those who come.
   void publish_all();
@@ -47,16 +47,17 @@ class SitePublisher {
  private:
   using Clock = std::chrono::steady_clock;
   void work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots);
+  void tell(const std::atomic<bool>& stopping);
   void draw(const std::atomic<bool>& stopping);
   void write_objects(const DriveLoad& load, int robots, double seconds, StampNs stamp_ns);
   void change_map(const DriveLoad& load, int robots);
   void send_status(int robots);
 
   Site& site_;
-  const dds::NodeFile config_;
+  const NodeFile config_;
   std::shared_ptr<dds::Participant> participant_;
   dds::Wakeup wakeup_;
-  std::mutex mutex_;  // what both threads use
+  dds::Wakeup tellers_wakeup_;
   dds::ObjectPublication objects_;
   dds::MapPublication map_;
   dds::StatusPublication status_;

@@ -1,55 +1,20 @@
 // What tests on the bus share: a domain of their own, waiting for a state, the commands.
 #pragma once
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <stdexcept>
 #include <string>
-#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_msgsPubSubTypes.h"
 #include "run_command.hpp"
+#include "test_domain.hpp"
 
 namespace pocd {
-
-/// A DDS domain that no other test uses, held by a lock on a file for as long as the object lives.
-class TestDomain {
- public:
-  TestDomain() {
-    const auto folder = std::filesystem::temp_directory_path() /
-                        ("pocd_test_domains_" + std::to_string(::getuid()));
-    std::filesystem::create_directories(folder);
-    int error = 0;
-    for (number_ = 100; number_ < 200; ++number_) {
-      file_ = open((folder / std::to_string(number_)).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-      if (file_ >= 0 && flock(file_, LOCK_EX | LOCK_NB) == 0) return;
-      error = errno;
-      if (file_ >= 0) close(file_);
-    }
-    throw std::runtime_error("no free domain from 100 to 199, " + folder.string() + ": " +
-                             std::system_category().message(error));
-  }
-  ~TestDomain() { close(file_); }
-  TestDomain(const TestDomain&) = delete;
-  TestDomain& operator=(const TestDomain&) = delete;
-
-  int number() const { return number_; }
-  std::string text() const { return std::to_string(number_); }
-
- private:
-  int number_ = 0;
-  int file_ = -1;
-};
 
 // Far more than anything takes; only a test that fails gets there.
 constexpr std::chrono::seconds kGenerous{120};

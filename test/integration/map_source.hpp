@@ -78,8 +78,8 @@ class MapSource {
     return std::make_shared<dds::Participant>(
         dds::BusOptions{domain.number(), profiles_file, "pocd_test"});
   }
-  static dds::NodeFile config(double rate_mb_s, int map_id) {
-    dds::NodeFile file;
+  static NodeFile config(double rate_mb_s, int map_id) {
+    NodeFile file;
     file.node.map_id = map_id;
     file.node.map_period_s = 0.0;
     file.node.map_rate_mb_s = rate_mb_s;

@@ -41,7 +41,7 @@ TEST(BadSenders, AreNamedOnceAndCounted) {
   const CommandResult result = node.wait();
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.err.find("4 frames processed"), std::string::npos) << result.err;
-  EXPECT_EQ(count_of(result.err, info + ": wrong_type: announced with type "
+  EXPECT_EQ(count_of(result.err, info + ": wrong_type: has type "
                                         "nav_msgs::msg::dds_::Odometry_, expected "
                                         "sensor_msgs::msg::dds_::CameraInfo_"),
             1u)

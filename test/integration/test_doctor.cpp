@@ -107,6 +107,55 @@ TEST(Doctor, NamesWhatIsWrongOnTheBus) {
   }
 }
 
+// Names without rt/, and partitions: both look right to the one who sends.
+TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
+  const TestDomain domain;
+  const Machine machine;
+  const auto bus = test_participant(domain);
+  using ImageWriter = dds::Writer<sensor_msgs::msg::ImagePubSubType>;
+  ImageWriter bare(bus, dds::topics::kDepth, "robot1/depth/image_raw", kTestDelivery);
+  ImageWriter other(bus, dds::topics::kDepth, "rt/robot1/front/depth/image_rect_raw",
+                    kTestDelivery);
+  Process doctor(machine.command(
+      domain, {"--listen", "600", "--verbose", "--robot", "robot1", "--robot", "robot2"}));
+  const CommandResult result = ask(doctor, [](StampNs) {},
+                                   {"robot1/depth/image_raw: is announced",
+                                    "rt/robot1/front/depth/image_rect_raw: is announced"});
+  EXPECT_EQ(result.exit_code, 1);
+  for (const char* part :
+       {"there is robot1/depth/image_raw, without rt/",
+        "image topics are: robot1/depth/image_raw, rt/robot1/front/depth/image_rect_raw",
+        "--set 'node.topics.depth="}) {
+    EXPECT_NE(result.out.find(part), std::string::npos) << part << "\n" << result.out;
+  }
+}
+
+TEST(Doctor, SuggestsAConfigurationThatFits) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info(
+      bus, dds::topics::kCameraInfo, "rt/r1/cam/depth/camera_info", kTestDelivery);
+  dds::Writer<sensor_msgs::msg::ImagePubSubType> depth(
+      bus, dds::topics::kDepth, "rt/r1/cam/depth/image_rect_raw", kTestDelivery);
+  // Discovery takes a moment: a longer look where the first one was too short.
+  CommandResult result;
+  EXPECT_TRUE(eventually([&] {
+    result =
+        run_command({bin("pocd_doctor"), "--suggest", "--listen", "1", "--domain", domain.text()});
+    return result.exit_code == 0 && result.out.find("camera_info_topic") != std::string::npos;
+  })) << result.out
+      << result.err;
+  const TemporaryFolder folder;
+  write_file(folder.path() / "suggested.yaml", result.out);
+  const CommandResult dump =
+      run_command({bin("pocd_node"), "--dump", "--config", source("config/simulated.yaml"),
+                   "--config", (folder.path() / "suggested.yaml").string()});
+  EXPECT_EQ(dump.exit_code, 0) << dump.err;
+  for (const char* part : {"rt/r1/cam/depth/image_rect_raw", "rt/r1/cam/depth/camera_info"}) {
+    EXPECT_NE(dump.out.find(part), std::string::npos) << part << "\n" << dump.out;
+  }
+}
+
 TEST(Doctor, NamesWhatIsWrongWithConfigurationAndMachine) {
   const TestDomain domain;
   const Machine machine("212992");

@@ -186,7 +186,7 @@ TEST(Fleet, AWrongTypeOnARobotsTopicIsSaid) {
   EXPECT_TRUE(health.newest()->robots().empty());
   node.signal(SIGTERM);
   const CommandResult ended = node.wait();
-  EXPECT_NE(ended.err.find("announced with type sensor_msgs::msg::dds_::CameraInfo_, expected "
+  EXPECT_NE(ended.err.find("has type sensor_msgs::msg::dds_::CameraInfo_, expected "
                            "sensor_msgs::msg::dds_::Image_"),
             std::string::npos)
       << ended.err;

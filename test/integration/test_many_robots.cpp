@@ -1,12 +1,11 @@
-// More robots than a node listens to.
+// Many robots: more than a node listens to, and what each of them costs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
-#include "bus_harness.hpp"
-#include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/intake.hpp"
-#include "sensor_msgsPubSubTypes.h"
+#include "robot_sender.hpp"
 
 namespace pocd {
 namespace {
@@ -17,12 +16,12 @@ TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
   dds::BusWatch watch;
   dds::BusOptions options{domain.number(), "", "intake"};
   options.listener = &watch;
-  dds::NodeConfig config;
+  NodeConfig config;
   config.segmentation = "absent";
   dds::FrameQueue queue(1);
   dds::LatencyLog latency("");
-  dds::Intake intake(std::make_shared<dds::Participant>(options), config, ClassMap{}, watch, queue,
-                     latency);
+  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch,
+                     queue, latency);
   const auto names = [&] {
     std::set<std::string> present;
     for (const auto& robot : intake.status().robots) {
@@ -59,6 +58,82 @@ TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
   const auto departures = intake.status().departures;
   ASSERT_EQ(departures.size(), 1u) << "who was not listened to cannot depart";
   EXPECT_EQ(departures[0].name, heard);
+  intake.stop();
+  intake.rethrow();
+}
+
+// 12 robots with 10 broadcasters each, all there before the node has time to look.
+TEST(Intake, KeepsEveryStaticTransformOfAFleet) {
+  constexpr int kBroadcasters = 150;
+  const TestDomain domain;
+  const auto bus = test_participant(domain), other = test_participant(domain);
+  dds::Wakeup wakeup;
+  dds::TransformInput input(bus, "rt/tf", "rt/tf_static", false, wakeup);
+  using Writer = dds::Writer<tf2_msgs::msg::TFMessagePubSubType>;
+  std::vector<std::unique_ptr<Writer>> broadcasters;
+  for (int i = 0; i < kBroadcasters; ++i) {
+    broadcasters.push_back(std::make_unique<Writer>(other, dds::topics::kTfStatic, "rt/tf_static",
+                                                    dds::topics::latched(1)));
+    tf2_msgs::msg::TFMessage message;
+    message.transforms().push_back(
+        dds::transform_message({"map", "camera" + std::to_string(i), 1, {}}));
+    ASSERT_TRUE(broadcasters.back()->write(message));
+  }
+  ASSERT_TRUE(eventually([&] {
+    return std::all_of(broadcasters.begin(), broadcasters.end(), [](const auto& broadcaster) {
+      return broadcaster->matched() > 0 && broadcaster->wait_acknowledged(kGenerous);
+    });
+  }));
+  TransformTree tree(1'000'000'000);
+  dds::ProblemCounter problems;
+  int known = 0;
+  EXPECT_TRUE(eventually([&] {
+    input.drain_static(tree, problems);
+    known = 0;
+    for (int i = 0; i < kBroadcasters; ++i) {
+      known += tree.lookup("map", "camera" + std::to_string(i), 1, 0).result == PoseLookup::kFound;
+    }
+    return known == kBroadcasters;
+  })) << known;
+}
+
+// What one robot sends costs a look at that robot, not at the fleet.
+TEST(Intake, ASampleCostsALookAtItsRobotOnly) {
+  constexpr int kRobots = 40, kSamples = 400;
+  const TestDomain domain;
+  dds::BusWatch watch;
+  dds::BusOptions options{domain.number(), "", "intake"};
+  options.listener = &watch;
+  NodeConfig config;
+  config.segmentation = "absent";
+  dds::FrameQueue queue(1);
+  dds::LatencyLog latency("");
+  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch,
+                     queue, latency);
+  const auto bus = test_participant(domain);
+  std::vector<std::unique_ptr<RobotSender>> robots;
+  for (int i = 0; i < kRobots; ++i) {
+    robots.push_back(std::make_unique<RobotSender>(bus, "r" + std::to_string(i)));
+  }
+  ASSERT_TRUE(eventually([&] {
+    return std::all_of(robots.begin(), robots.end(),
+                       [](const auto& robot) { return robot->matched(); });
+  }));
+  const auto looks = [&] { return intake.status().visits; };
+  // Its status is of the last look at everybody; as long as nothing comes these are all there are.
+  const auto started = std::chrono::steady_clock::now();
+  const std::uint64_t before = looks();
+  for (StampNs i = 1; i <= kSamples; ++i) {
+    robots[0]->send_odometry({"map", "base", i * 10'000'000, {}});
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(250));
+  const double elapsed_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  // Everybody every 100 ms, one robot with each sample, and twice that as a margin.
+  const double most = 2.0 * (kRobots * (elapsed_s / 0.1 + 2.0) + kSamples);
+  EXPECT_LT(static_cast<double>(looks() - before), most);
+  EXPECT_LT(most, kRobots * kSamples) << "the test says something";
   intake.stop();
   intake.rethrow();
 }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "robot_sender.hpp"
 
@@ -35,7 +36,7 @@ TEST(Node, UsageErrorsNameWhatIsWrongAndExitCodeIs2) {
        "queue_frames: 0 is out of range"},
       {{"--config", config, "--robot", "r", "--robot", "r"}, "the name r is used twice"},
       {{"--config", config, "--robot", "r 1"}, "\"r 1\" has a blank"},
-      {{"--config", config, "--set", "node.topics.odometry=/{robot}/odom"}, "\"rt/{robot}/odom\""},
+      {{"--config", config, "--set", "node.topics.odometry=rt/{robot}/o dom"}, "has a blank in it"},
       {{"--config", config, "--robot", "r", "--domain", "500"}, "--domain"},
       {{"--nonsense"}, "--nonsense"}};
   for (auto [arguments, named] : cases) {
@@ -239,7 +240,7 @@ TEST(Node, IsHeardWhileItEmptiesItsQueue) {
   RobotSender sender(bus, "robot1");
   Process node(
       node_command(domain, {"--lossless", "--set", "node.queue_frames=1000", "--set",
-                            "node.segmentation=absent", "--set", "map.voxel_size_m=0.01"}));
+                            "node.segmentation=absent", "--set", "map.voxel_size_m=0.005"}));
   ASSERT_TRUE(eventually([&] { return sender.matched(); }));
   std::vector<pocd_msgs::msg::NodeHealth> heard;
   const auto hear = [&] {
@@ -260,13 +261,14 @@ TEST(Node, IsHeardWhileItEmptiesItsQueue) {
     auto depth = dds::image_message(cv::Mat(480, 640, CV_16UC1, cv::Scalar(1500)), "16UC1",
                                     stamp_ns, "camera");
     EXPECT_TRUE(sender.depth.write(depth));
-    EXPECT_TRUE(sender.depth.wait_acknowledged(kGenerous));
   };
   ASSERT_TRUE(eventually([&] {  // work for four seconds
     if (!hear()) return false;
     const auto& now = heard.back();
     if (now.queue_length() * now.processing_ms() > 4000.0) return true;
-    for (int i = 0; i < 60; ++i) send();
+    // Faster than they are processed: not one by one, and fewer than the writer keeps.
+    for (int i = 0; i < 100; ++i) send();
+    EXPECT_TRUE(sender.depth.wait_acknowledged(kGenerous));
     return false;
   }));
   const std::size_t before = heard.size();
@@ -276,6 +278,33 @@ TEST(Node, IsHeardWhileItEmptiesItsQueue) {
   // One may have been on its way when the signal came.
   ASSERT_GE(heard.size(), before + 3) << "only its last word";
   EXPECT_EQ(heard[before + 1].message(), "running");
+}
+
+TEST(Commands, SayAsMuchAsIsWantedAndAsJsonLines) {
+  const TestDomain domain;
+  const auto said = [&](const std::vector<std::string>& more) {
+    auto command = std::vector<std::string>{bin("pocd_mirror"), "--timeout", "0.5", "--domain",
+                                            domain.text()};
+    command.insert(command.end(), more.begin(), more.end());
+    return run_command(command).err;
+  };
+  EXPECT_NE(said({}).find("pocd_mirror: info: stale, because no publisher"), std::string::npos);
+  const std::string little = said({"--log-level", "error"});
+  EXPECT_EQ(little.find("info"), std::string::npos) << little;
+  EXPECT_NE(little.find("pocd_mirror: error: gave up after 0.5 s"), std::string::npos) << little;
+  EXPECT_EQ(said({"--log-level", "off"}), "");
+  std::istringstream lines(said({"--log-json"}));
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    EXPECT_EQ(line.rfind("{\"time\":\"2", 0), 0u) << line;
+    EXPECT_NE(line.find("Z\",\"level\":\""), std::string::npos) << line;
+    EXPECT_NE(line.find("\"program\":\"pocd_mirror\",\"message\":\""), std::string::npos) << line;
+    EXPECT_EQ(line.substr(line.size() - 2), "\"}") << line;
+  }
+  EXPECT_GE(count, 2);
+  const CommandResult wrong = run_command({bin("pocd_mirror"), "--log-level", "loud"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("--log-level"), std::string::npos) << wrong.err;
 }
 
 TEST(Node, OperatorsProfileReplacesTheTable) {

@@ -8,16 +8,14 @@
 
 #include "diagnostic_msgsPubSubTypes.h"
 #include "map_msgsPubSubTypes.h"
-#include "map_source.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "over_the_bus.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
-#include "pocd_dds/bridge/ros_messages.hpp"
+#include "pocd_dds/bridge/occupancy_projection.hpp"
+#include "pocd_dds/bridge/surface_points.hpp"
 #include "pocd_dds/map_mirror.hpp"
-#include "pocd_dds/node/ros_outputs.hpp"
 #include "rmf_obstacle_msgsPubSubTypes.h"
 #include "robot_sender.hpp"
-#include "rosgraph_msgsPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"
 #include "whole_run.hpp"
@@ -186,96 +184,6 @@ TEST(RosOutputs, ShowTheMapAndTheObjectsOfTheRun) {
   }
 }
 
-/// The outputs alone, in a time that the test makes.
-struct OutputsInSimulatedTime {
-  explicit OutputsInSimulatedTime(const dds::RosOutputConfig& rates,
-                                  const std::string& profiles = "")
-      : bus(std::make_shared<dds::Participant>(
-            dds::BusOptions{domain.number(), profiles, "pocd_test"})),
-        outputs(bus, config(rates), 1) {}
-
-  void at(double second) {
-    const auto now_ns = static_cast<StampNs>(second * 1e9) + 1'000'000'000'000;
-    outputs.collect({objects, touched}, {tiles, changed_tiles}, now_ns, now_ns, false);
-    outputs.send();
-  }
-  void put(int id) {
-    objects[static_cast<ObjectId>(id)].id = static_cast<ObjectId>(id);
-    touched.insert(static_cast<ObjectId>(id));
-  }
-  void remove(int id) {
-    objects.erase(static_cast<ObjectId>(id));
-    touched.insert(static_cast<ObjectId>(id));
-  }
-  static dds::NodeFile config(const dds::RosOutputConfig& rates) {
-    dds::NodeFile file;
-    file.node.outputs = rates;
-    return file;
-  }
-
-  const TestDomain domain;
-  std::shared_ptr<dds::Participant> bus;
-  dds::RosOutputs outputs;
-  dds::ObjectsById objects;
-  std::set<ObjectId> touched;
-  std::map<TileKey, MapTile> tiles;
-  std::set<TileKey> changed_tiles;
-};
-
-// As Open-RMF's obstacle manager does it: an obstacle is there until it is deleted or its lifetime
-// since the last message about it is over.
-TEST(RosOutputs, ObstaclesAreRefreshedInTimeAndGoByDeleteAndByLapse) {
-  dds::RosOutputConfig rates;
-  rates.obstacles_hz = 2.0;
-  rates.markers_hz = 5.0;
-  rates.occupancy_hz = rates.surface_hz = 0.0;
-  rates.obstacle_lifetime_s = 1.25;
-  OutputsInSimulatedTime node(rates);
-  dds::Wakeup wakeup;
-  dds::Reader<rmf_obstacle_msgs::msg::ObstaclesPubSubType> reader(
-      node.bus, dds::topics::kRmfObstacles, wakeup);
-  dds::Reader<visualization_msgs::msg::MarkerArrayPubSubType> marker_reader(
-      node.bus, dds::topics::kMarkers, wakeup);
-  ASSERT_TRUE(eventually([&] { return reader.matched() > 0 && marker_reader.matched() > 0; }));
-  std::map<int, StampNs> ends_ns;  // what the manager has
-  int messages = 0, marker_messages = 0, deletes = 0;
-  node.put(1), node.put(2);
-  const auto stamp = [](double second) {
-    return static_cast<StampNs>(second * 1e9) + 1'000'000'000'000;
-  };
-  for (int tick = 0; tick < 200; ++tick) {  // ten seconds
-    const double second = 0.05 * tick;
-    if (tick == 100) node.remove(2);
-    node.at(second);
-    rmf_obstacle_msgs::msg::Obstacles list;
-    visualization_msgs::msg::MarkerArray array;
-    dds::SampleMeta meta;
-    while (marker_reader.take(array, meta)) ++marker_messages;
-    while (reader.take(list, meta)) {
-      ++messages;
-      for (const auto& obstacle : list.obstacles()) {
-        if (obstacle.action() == 2) {
-          ++deletes;
-          ends_ns.erase(obstacle.id());
-          continue;
-        }
-        ends_ns[obstacle.id()] = dds::to_stamp(obstacle.header().stamp()) +
-                                 obstacle.lifetime().sec() * 1'000'000'000 +
-                                 obstacle.lifetime().nanosec();
-      }
-    }
-    // None lapses while it is there, not even when a message is lost.
-    ASSERT_EQ(ends_ns.size(), tick < 100 ? 2u : 1u) << second;
-    for (const auto& [id, end_ns] : ends_ns) EXPECT_GT(end_ns, stamp(second + 0.5)) << id;
-  }
-  // Best effort, and yet exact: the reader shares the participant of the writer.
-  EXPECT_EQ(messages, 20) << "twice a second";
-  EXPECT_EQ(marker_messages, 50) << "five times a second";
-  EXPECT_EQ(deletes, 5) << "a message may be lost";
-  // The component has gone: the manager forgets all within the lifetime.
-  for (const auto& [id, end_ns] : ends_ns) EXPECT_LE(end_ns, stamp(9.95 + 1.25)) << id;
-}
-
 // What one robot sees is a kilometre away from what the other sees: 400 million cells.
 TEST(RosOutputs, AGridThatIsTooLargeIsSaidAndNotPublished) {
   const TestDomain domain;
@@ -300,94 +208,6 @@ TEST(RosOutputs, AGridThatIsTooLargeIsSaidAndNotPublished) {
   EXPECT_EQ(ended.exit_code, 0) << ended.err;
   EXPECT_EQ(count_of(ended.err, "rt/pocd/map: a grid of more than 64000000 cells"), 1u)
       << ended.err;
-}
-
-// A profile lets the writers keep one sample until it is acknowledged, and a reader has room for
-// one: what is written beyond that is refused. It is made good when there is room, although nothing
-// changes any more.
-TEST(RosOutputs, WhatIsRefusedIsSentAgain) {
-  talk_over_the_bus();  // the short cut within a process loses what the reader has no room for
-  const TemporaryFolder folder;
-  const auto profiles = folder.path() / "profiles.xml";
-  {
-    std::ofstream file(profiles);
-    file << R"(<?xml version="1.0" encoding="UTF-8" ?>
-<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">)";
-    for (const char* topic : {"rt/pocd/map", "rt/pocd/objects/markers"}) {
-      file << "<data_writer profile_name=\"" << topic << R"("><topic>
-  <historyQos><kind>KEEP_ALL</kind></historyQos><resourceLimitsQos><max_samples>1</max_samples>
-  <max_instances>1</max_instances><max_samples_per_instance>1</max_samples_per_instance>
-  <allocated_samples>0</allocated_samples></resourceLimitsQos></topic>
-  <qos><reliability><kind>RELIABLE</kind><max_blocking_time><nanosec>1000000</nanosec>
-  </max_blocking_time></reliability><durability><kind>TRANSIENT_LOCAL</kind></durability></qos>
-  <times><heartbeatPeriod><nanosec>20000000</nanosec></heartbeatPeriod></times>
-  <historyMemoryPolicy>DYNAMIC</historyMemoryPolicy></data_writer>)";
-    }
-    file << "</profiles>";
-  }
-  dds::RosOutputConfig rates;
-  rates.markers_hz = rates.occupancy_hz = 1.0;
-  rates.obstacles_hz = rates.surface_hz = 0.0;
-  OutputsInSimulatedTime node(rates, profiles.string());
-  dds::Wakeup wakeup;
-  const dds::Delivery one{true, true, 0, 1, 0, false, 0};
-  dds::Reader<nav_msgs::msg::OccupancyGridPubSubType> grids(node.bus, dds::topics::kOccupancy,
-                                                            "rt/pocd/map", one, wakeup);
-  dds::Reader<visualization_msgs::msg::MarkerArrayPubSubType> arrays(
-      node.bus, dds::topics::kMarkers, "rt/pocd/objects/markers", one, wakeup);
-  ASSERT_TRUE(eventually([&] { return grids.matched() > 0 && arrays.matched() > 0; }));
-
-  TsdfMap map{TsdfConfig{}};
-  MapPublisher publisher(1, TsdfConfig{});
-  Random random(3);
-  double second = 0.0;
-  const auto grow = [&] {
-    for (int i = 0; i < 2; ++i) fill_block(map, {static_cast<int>(8 * second) + i, i, 1}, random);
-    const std::optional<MapDelta> step = publisher.make_step(map);
-    ASSERT_TRUE(step);
-    publisher.take_over(*step);
-    node.tiles = publisher.tiles();
-    for (const MapTile& tile : step->changed) node.changed_tiles.insert(tile.key);
-    node.at(second += 1.0);
-  };
-  node.put(1), node.put(2);
-  ASSERT_TRUE(eventually([&] {  // the reader's, the writer's, and those that are refused
-    grow();
-    return node.outputs.failures() > 0;
-  }));
-  node.remove(2);
-  for (int i = 0; i < 2 * dds::Departures::kTimes; ++i) grow();
-
-  std::vector<MapTile> tiles;
-  for (const auto& entry : publisher.tiles()) tiles.push_back(entry.second);
-  const dds::NodeFile config = OutputsInSimulatedTime::config(rates);
-  dds::OccupancyProjection projection(
-      {config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m(),
-       config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m});
-  projection.apply(tiles, {});
-  projection.update();
-  const auto known = [](const auto& cells) {
-    return cells.size() - std::count(cells.begin(), cells.end(), -1);
-  };
-  ASSERT_GT(known(projection.grid().cells), 0u);
-  nav_msgs::msg::OccupancyGrid grid;
-  visualization_msgs::msg::MarkerArray array;
-  std::set<std::int32_t> markers;
-  dds::SampleMeta meta;
-  EXPECT_TRUE(eventually([&] {
-    node.at(second += 1.0);
-    grids.take(grid, meta);
-    if (arrays.take(array, meta)) {
-      for (const auto& marker : array.markers()) {
-        if (marker.action() == 3) markers.clear();
-        if (marker.action() == 2) markers.erase(marker.id());
-        if (marker.action() == 0) markers.insert(marker.id());
-      }
-    }
-    return known(grid.data()) == known(projection.grid().cells) &&
-           markers == std::set<std::int32_t>{1};
-  })) << known(grid.data())
-      << " of " << known(projection.grid().cells) << " cells, " << markers.size() << " markers";
 }
 
 TEST(RosOutputs, EachCanBeSwitchedOff) {

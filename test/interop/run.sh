@@ -23,7 +23,15 @@ rm -rf messages && mkdir messages
 "$write_messages" messages
 node check_cdr.js messages
 
-export ROS_DOMAIN_ID=${POCD_INTEROP_DOMAIN:-87} SKIP_DEFAULT_XML=1
+# A domain that no other test uses, as TestDomain of test/support takes one; nobody else on the network hears it.
+locks=${TMPDIR:-/tmp}/pocd_test_domains_$(id -u)
+mkdir -p "$locks"
+for domain in $(seq 100 199); do
+  exec 9>"$locks/$domain"
+  flock -n 9 && break
+done
+export ROS_DOMAIN_ID=$domain SKIP_DEFAULT_XML=1
+export FASTRTPS_DEFAULT_PROFILES_FILE=$here/../../launch_scripts/loopback.xml
 pids=()
 trap '((${#pids[@]} == 0)) || kill "${pids[@]}" 2>/dev/null || true' EXIT
 # Waits for a line in a log: the processes say when they are ready.

@@ -8,19 +8,19 @@
 #include <thread>
 
 #include "run_command.hpp"
+#include "test_domain.hpp"
 
 namespace pocd {
 
-/// A domain that hardly any other test process uses at the same time (others are above 99), for
-/// this process and its children.
+/// A domain of its own for this process and its children, until it ends.
 inline std::string test_domain() {
-  static const std::string domain = [] {
-    const std::string text = std::to_string(20 + ::getpid() % 60);
-    ::setenv("ROS_DOMAIN_ID", text.c_str(), 1);
+  static const TestDomain domain;
+  static const std::string text = [] {
+    ::setenv("ROS_DOMAIN_ID", domain.text().c_str(), 1);
     ::setenv("SKIP_DEFAULT_XML", "1", 1);
-    return text;
+    return domain.text();
   }();
-  return domain;
+  return text;
 }
 
 inline std::string command(const std::string& name) {

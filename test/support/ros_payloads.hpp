@@ -1,7 +1,9 @@
 // Payloads of the ROS messages that frames are made of, as a sender would write them.
 #pragma once
 
+#include <algorithm>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,21 @@ inline Bytes image_payload(StampNs stamp_ns, const std::string& frame, const std
   out.number(static_cast<std::uint32_t>(step));
   out.number(static_cast<std::uint32_t>(step * image.rows));
   for (int row = 0; row < image.rows; ++row) out.raw(image.ptr(row), step);
+  return out.bytes();
+}
+
+/// As image_transport's compressedDepth: 12 bytes of header, then PNG.
+inline Bytes compressed_depth_payload(StampNs stamp_ns, const std::string& frame,
+                                      const cv::Mat& depth) {
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", depth, png);
+  std::vector<std::uint8_t> data(12 + png.size(), 0);
+  std::copy(png.begin(), png.end(), data.begin() + 12);
+  CdrWriter out;
+  put_header(out, stamp_ns, frame);
+  out.string("16UC1; compressedDepth");
+  out.number(static_cast<std::uint32_t>(data.size()));
+  out.raw(data.data(), data.size());
   return out.bytes();
 }
 

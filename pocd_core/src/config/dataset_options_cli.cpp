@@ -116,18 +116,26 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
       ->capture_default_str();
   add(app.add_option("--sensor", options.sensor, "Sensor model instead of the scenario's (sim)"))
       ->check(CLI::IsMember({"perfect", "stereo"}));
-  add(app.add_flag("--as-live", options.recording.as_live,
+  add(app.add_flag("--as-live", options.as_live,
                    "Only the frames that the component took while they were recorded (mcap)"));
-  const auto add_topic = [&](const std::string& flag, std::string& topic) {
-    add(app.add_option(flag, topic, "Topic in a recording; {robot} stands for any name (mcap)"))
-        ->capture_default_str();
-  };
-  add_topic("--depth-topic", options.recording.depth);
-  add_topic("--camera-info-topic", options.recording.camera_info);
-  add_topic("--segmentation-topic", options.recording.segmentation);
-  add_topic("--color-topic", options.recording.color);
-  add_topic("--odometry-topic", options.recording.odometry);
   for (CLI::Option* option : all) option->group("Frames");
+}
+
+void add_topic_options(CLI::App& app, std::vector<std::string>& overrides) {
+  const auto add = [&](const std::string& flag, const std::string& key) {
+    app.add_option_function<std::string>(
+           flag,
+           [&overrides, key](const std::string& topic) {
+             overrides.push_back("node.topics." + key + "=" + topic);
+           },
+           "Short for --set node.topics." + key + "=TOPIC; {robot} stands for any name (mcap)")
+        ->group("Frames");
+  };
+  add("--depth-topic", "depth");
+  add("--camera-info-topic", "camera_info");
+  add("--segmentation-topic", "segmentation");
+  add("--color-topic", "color");
+  add("--odometry-topic", "odometry");
 }
 
 }  // namespace pocd

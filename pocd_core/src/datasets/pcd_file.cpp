@@ -110,6 +110,40 @@ void require_whole(const fs::path& file) {
   }
 }
 
+/// Bytes of a number in a field; 0: no type that PCD knows.
+std::size_t bytes_of(unsigned type) {
+  switch (type) {
+    case pcl::PCLPointField::INT8:
+    case pcl::PCLPointField::UINT8:
+      return 1;
+    case pcl::PCLPointField::INT16:
+    case pcl::PCLPointField::UINT16:
+      return 2;
+    case pcl::PCLPointField::INT32:
+    case pcl::PCLPointField::UINT32:
+    case pcl::PCLPointField::FLOAT32:
+      return 4;
+    case pcl::PCLPointField::FLOAT64:
+      return 8;
+    default:
+      return 0;
+  }
+}
+
+/// A field of one number of any type; null when there is none of that name.
+const pcl::PCLPointField* number_field(const pcl::PCLPointCloud2& cloud, const std::string& name,
+                                       const fs::path& file) {
+  for (const pcl::PCLPointField& field : cloud.fields) {
+    if (field.name != name) continue;
+    const std::size_t bytes = bytes_of(field.datatype);
+    if (bytes > 0 && field.count <= 1 && field.offset + bytes <= cloud.point_step) return &field;
+    throw InputError(file.string() + ": field " + name + " has type " +
+                     std::to_string(field.datatype) + " and count " + std::to_string(field.count) +
+                     ", expected one number");
+  }
+  return nullptr;
+}
+
 /// A field of four bytes that lies within the point.
 const pcl::PCLPointField* field_of(const pcl::PCLPointCloud2& cloud, const std::string& name,
                                    unsigned type) {
@@ -147,6 +181,37 @@ T value_at(const std::uint8_t* point, const pcl::PCLPointField* field) {
   return value;
 }
 
+/// The label of a point, whatever its type; what is no label (negative, not finite, not in 32 bits)
+/// is 0, invalid.
+std::uint32_t label_at(const std::uint8_t* point, const pcl::PCLPointField* field) {
+  double value = 0.0;
+  switch (field->datatype) {
+    case pcl::PCLPointField::INT8:
+      value = value_at<std::int8_t>(point, field);
+      break;
+    case pcl::PCLPointField::UINT8:
+      value = value_at<std::uint8_t>(point, field);
+      break;
+    case pcl::PCLPointField::INT16:
+      value = value_at<std::int16_t>(point, field);
+      break;
+    case pcl::PCLPointField::UINT16:
+      value = value_at<std::uint16_t>(point, field);
+      break;
+    case pcl::PCLPointField::INT32:
+      value = value_at<std::int32_t>(point, field);
+      break;
+    case pcl::PCLPointField::UINT32:
+      return value_at<std::uint32_t>(point, field);
+    case pcl::PCLPointField::FLOAT32:
+      value = static_cast<double>(value_at<float>(point, field));
+      break;
+    default:
+      value = value_at<double>(point, field);
+  }
+  return value >= 1.0 && value <= 2147483647.0 ? static_cast<std::uint32_t>(value) : 0;
+}
+
 }  // namespace
 
 PcdImages read_pcd(const fs::path& file) {
@@ -157,7 +222,7 @@ PcdImages read_pcd(const fs::path& file) {
       !field_of(cloud, "y", pcl::PCLPointField::FLOAT32)) {
     throw InputError(file.string() + ": has no float fields x y z");
   }
-  const auto* label = field_of(cloud, "label", pcl::PCLPointField::UINT32);
+  const auto* label = number_field(cloud, "label", file);
   const pcl::PCLPointField* color = nullptr;
   for (const char* name : {"rgba", "rgb"}) {
     for (const unsigned type : {pcl::PCLPointField::UINT32, pcl::PCLPointField::FLOAT32}) {
@@ -174,7 +239,7 @@ PcdImages read_pcd(const fs::path& file) {
       const std::uint8_t* point =
           cloud.data.data() + (static_cast<std::size_t>(v) * cols + u) * cloud.point_step;
       const float depth = value_at<float>(point, z);
-      const std::uint32_t id = label ? value_at<std::uint32_t>(point, label) : 1;
+      const std::uint32_t id = label ? label_at(point, label) : 1;
       out.depth_m.at<float>(v, u) = std::isfinite(depth) && depth > 0.0f && id != 0 ? depth : 0.0f;
       if (label) out.raw_labels.at<std::int32_t>(v, u) = static_cast<std::int32_t>(id);
       if (color) {

@@ -8,8 +8,6 @@ const char* to_string(InputReason reason) {
       return "empty_image";
     case InputReason::kUnknownEncoding:
       return "unknown_encoding";
-    case InputReason::kBigEndian:
-      return "big_endian";
     case InputReason::kStepTooSmall:
       return "step_too_small";
     case InputReason::kDataSize:
@@ -54,6 +52,14 @@ const char* to_string(InputReason reason) {
       return "incompatible_qos";
     case InputReason::kCameraChanged:
       return "camera_changed";
+    case InputReason::kBadCompression:
+      return "bad_compression";
+    case InputReason::kUnlistedClass:
+      return "unlisted_class";
+    case InputReason::kNoMask:
+      return "no_mask";
+    case InputReason::kNoUsableDepth:
+      return "no_usable_depth";
   }
   return "";
 }

@@ -1,7 +1,9 @@
 #include "pocd/input/time_synchronizer.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -10,11 +12,21 @@
 namespace pocd {
 namespace {
 
+// Images from before the first pose, and the last ones of a run, are nobody's mistake; those
+// further off are.
+constexpr StampNs kNobodysMistake = 1'000'000'000;
+
 std::string stamp_text(StampNs stamp_ns) {
   const StampNs billion = 1'000'000'000;
   std::string nanoseconds = std::to_string(std::abs(stamp_ns % billion));
   return std::to_string(stamp_ns / billion) + "." + std::string(9 - nanoseconds.size(), '0') +
          nanoseconds;
+}
+
+std::string milliseconds(StampNs ns) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.1f ms", static_cast<double>(ns) * 1e-6);
+  return text;
 }
 
 const char* name_of(TimeSynchronizer::Stream stream) {
@@ -95,8 +107,12 @@ void TimeSynchronizer::drop_beyond(Stream stream, StampNs stamp_ns) {
   } else if (stream == Stream::kCameraInfo) {
     cut(infos_);
   } else {
-    counts_.unmatched_images += cut(stream == Stream::kSegmentation ? segmentation_ : color_);
+    counts_.unmatched_images += cut(images_of(stream));
   }
+}
+
+TimeSynchronizer::Queue<cv::Mat>& TimeSynchronizer::images_of(Stream stream) {
+  return stream == Stream::kSegmentation ? segmentation_ : color_;
 }
 
 std::optional<InputProblem> TimeSynchronizer::add_image(Stream stream, StampNs stamp_ns,
@@ -104,24 +120,29 @@ std::optional<InputProblem> TimeSynchronizer::add_image(Stream stream, StampNs s
   POCD_CHECK(stream != Stream::kCameraInfo && stream != Stream::kPose);
   auto problem = judge(stream, stamp_ns);
   if (stamp_refused(problem)) return problem;
-  auto& images = stream == Stream::kDepth          ? depth_
-                 : stream == Stream::kSegmentation ? segmentation_
-                                                   : color_;
-  images.emplace_back(stamp_ns, std::move(image));
-  if (images.size() > config_.capacity) {
-    if (stream == Stream::kDepth) {
-      ++counts_.dropped_overflow;
-      watermark_ns_ = images.front().first;
-    } else {
-      ++counts_.unmatched_images;
-    }
-    images.pop_front();
+  if (stream == Stream::kDepth) {
+    depth_.emplace_back(stamp_ns, std::move(image));
+    if (depth_.size() <= 2 * config_.capacity) return problem;  // run() comes first
+    ++counts_.dropped_overflow;
+    watermark_ns_ = depth_.front().first;
+    depth_.pop_front();
+    return problem;
   }
+  Queue<cv::Mat>& images = images_of(stream);
+  images.emplace_back(stamp_ns, std::move(image));
+  if (images.size() <= config_.capacity) return problem;
+  ++counts_.unmatched_images;
+  if (stream == Stream::kSegmentation) last_mask_ns_ = images.front().first;
+  images.pop_front();
   return problem;
 }
 
 std::optional<InputProblem> TimeSynchronizer::add_camera_info(StampNs stamp_ns,
                                                               const CameraModel& camera) {
+  if (stamp_ns == 0) {
+    unstamped_info_ = camera;
+    return std::nullopt;
+  }
   auto problem = judge(Stream::kCameraInfo, stamp_ns);
   if (stamp_refused(problem)) return problem;
   infos_.emplace_back(stamp_ns, camera);
@@ -135,112 +156,170 @@ void TimeSynchronizer::pose_seen(StampNs stamp_ns, const std::optional<InputProb
   newest_pose_ns_ = restarted ? stamp_ns : std::max(newest_pose_ns_.value_or(stamp_ns), stamp_ns);
 }
 
-std::optional<cv::Mat> TimeSynchronizer::match(std::deque<std::pair<StampNs, cv::Mat>>& stream,
-                                               StampNs stamp_ns) {
-  while (!stream.empty() && stream.front().first < stamp_ns - config_.tolerance_ns) {
+bool TimeSynchronizer::settled(Stream stream, StampNs stamp_ns, bool last_call) const {
+  return last_call || depth_.size() >= config_.capacity ||
+         wait_over(stream, horizon_ns() - stamp_ns);
+}
+
+// Streams are in order: what belongs to the stamp will not come any more.
+bool TimeSynchronizer::passed(Stream stream, StampNs stamp_ns) const {
+  const std::optional<StampNs> newest = newest_ns(stream);
+  return newest && *newest > stamp_ns + config_.tolerance_ns;
+}
+
+TimeSynchronizer::Choice TimeSynchronizer::choose(Stream stream, StampNs stamp_ns, bool last_call) {
+  Queue<cv::Mat>& images = images_of(stream);
+  while (!images.empty() && images.front().first < stamp_ns - config_.tolerance_ns) {
+    if (stream == Stream::kSegmentation) last_mask_ns_ = images.front().first;
     ++counts_.unmatched_images;
-    stream.pop_front();
+    images.pop_front();
   }
-  if (stream.empty() || stream.front().first > stamp_ns + config_.tolerance_ns) return std::nullopt;
-  return stream.front().second;
+  const auto off = [&](StampNs other_ns) { return std::abs(other_ns - stamp_ns); };
+  auto nearest = images.end();
+  for (auto it = images.begin(); it != images.end(); ++it) {
+    if (off(it->first) > config_.tolerance_ns) break;
+    if (nearest == images.end() || off(it->first) < off(nearest->first)) nearest = it;
+  }
+  const bool wait_over = settled(stream, stamp_ns, last_call);
+  const std::optional<StampNs> newest = newest_ns(stream);
+  if (nearest != images.end()) {
+    // A nearer one may come, unless this one is exact or later ones have come already.
+    const bool final = nearest->first == stamp_ns || (newest && *newest > stamp_ns) || wait_over;
+    if (!final) return {Choice::State::kWait, 0, {}};
+    // It may be the next depth image's own.
+    const bool of_next =
+        depth_.size() > 1 && std::abs(nearest->first - depth_[1].first) < off(nearest->first);
+    if (!of_next) return {Choice::State::kFound, nearest->first, nearest->second};
+  } else if (!wait_over && !passed(stream, stamp_ns)) {
+    return {Choice::State::kWait, 0, {}};
+  }
+  return {};
+}
+
+void TimeSynchronizer::use_up(Stream stream, const Choice& choice) {
+  if (choice.state != Choice::State::kFound) return;
+  Queue<cv::Mat>& images = images_of(stream);
+  for (; images.front().first < choice.stamp_ns; images.pop_front()) ++counts_.unmatched_images;
+  images.pop_front();
+  if (stream == Stream::kSegmentation) last_mask_ns_ = choice.stamp_ns;
 }
 
 bool TimeSynchronizer::camera_at(StampNs stamp_ns, bool settle, CameraModel& camera) {
-  // Intrinsics hardly ever change, so the one before will do once the wait is over.
+  // Intrinsics hardly ever change, so the one before, or else the first, will do once the wait is
+  // over.
   while (infos_.size() > 1 && infos_[1].first <= stamp_ns + config_.tolerance_ns) {
     infos_.pop_front();
   }
-  if (infos_.empty() || infos_.front().first > stamp_ns + config_.tolerance_ns) return false;
-  if (infos_.front().first < stamp_ns - config_.tolerance_ns && !settle) return false;
+  if (infos_.empty()) {
+    if (unstamped_info_) camera = *unstamped_info_;
+    return unstamped_info_.has_value();
+  }
+  const bool own = std::abs(infos_.front().first - stamp_ns) <= config_.tolerance_ns;
+  if (!own && !settle) return false;
   camera = infos_.front().second;
+  return true;
+}
+
+void TimeSynchronizer::lacks(Stream stream, InputProblem problem) {
+  for (Lack& known : lacks_) {
+    if (known.stream != stream || known.problem.reason != problem.reason) continue;
+    ++known.times;
+    return;
+  }
+  lacks_.push_back({stream, std::move(problem)});
+}
+
+void TimeSynchronizer::lacks_mask(StampNs stamp_ns, bool used) {
+  std::optional<StampNs> nearest = last_mask_ns_;
+  if (!segmentation_.empty()) {
+    const StampNs later = segmentation_.front().first;
+    if (!nearest || std::abs(later - stamp_ns) < std::abs(*nearest - stamp_ns)) nearest = later;
+  }
+  if (!nearest) return;  // no mask has come yet: the robot may have none
+  const StampNs off = *nearest - stamp_ns;
+  lacks(Stream::kSegmentation,
+        {InputReason::kNoMask,
+         "the depth image of " + stamp_text(stamp_ns) + " has no mask within " +
+             milliseconds(config_.tolerance_ns) + ", the nearest is " +
+             milliseconds(std::abs(off)) + (off < 0 ? " earlier" : " later") +
+             (used ? ": the frame goes on without mask" : ": the frame is not used")});
+}
+
+bool TimeSynchronizer::pose_at(StampNs stamp_ns, bool last_call, Pose& T_W_C, bool& found) {
+  const bool is_settled = settled(Stream::kPose, stamp_ns, last_call);
+  const TransformLookup pose = transforms_.lookup(config_.map_frame, config_.camera_frame, stamp_ns,
+                                                  is_settled ? config_.extrapolation_ns : 0);
+  found = pose.result == PoseLookup::kFound;
+  if (found) {
+    T_W_C = pose.T_target_source;
+    return true;
+  }
+  const bool too_new = pose.result == PoseLookup::kTooNew;
+  if (!is_settled && (too_new || pose.result == PoseLookup::kEmpty)) {
+    blocked_by_ = Stream::kPose;
+    blocking_edge_ = pose.edge;
+    return false;
+  }
+  ++counts_.dropped_no_pose;
+  const bool excused = pose.result == PoseLookup::kTooOld ? pose.off_ns <= kNobodysMistake
+                       : too_new ? last_call && pose.off_ns <= kNobodysMistake
+                                 : last_call && counts_.complete > 0;
+  if (!excused) {
+    lacks(Stream::kPose,
+          transforms_.explain(config_.map_frame, config_.camera_frame, stamp_ns, pose));
+  }
   return true;
 }
 
 std::vector<SyncedFrame> TimeSynchronizer::run(bool last_call) {
   std::vector<SyncedFrame> frames;
   blocked_by_.reset();
-  const StampNs newest_of_all_ns = horizon_ns();
   while (!depth_.empty()) {
     const StampNs stamp_ns = depth_.front().first;
-    const auto settled = [&](Stream stream) {
-      return last_call || wait_over(stream, newest_of_all_ns - stamp_ns);
-    };
     SyncedFrame frame;
     frame.stamp_ns = stamp_ns;
-    std::uint64_t* drop = nullptr;
-
-    const auto passed = [&](Stream stream) {  // streams are in order: it will not come any more
-      const std::optional<StampNs> newest = newest_ns(stream);
-      return newest && *newest > stamp_ns + config_.tolerance_ns;
-    };
-    // True when the frame may go on as far as this stream is concerned.
-    const auto fetch = [&](StreamUse use, Stream stream, auto& images, cv::Mat& out,
-                           std::uint64_t& without, std::uint64_t& dropped) {
-      if (use == StreamUse::kAbsent) return true;
-      if (auto image = match(images, stamp_ns)) {
-        out = std::move(*image);
-        return true;
-      }
-      if (!settled(stream) && !passed(stream)) {
-        blocked_by_ = stream;
-        return false;
-      }
-      if (use == StreamUse::kRequired) {
-        drop = &dropped;
-      } else {
-        ++without;
-      }
-      return true;
-    };
-
-    const bool camera_settled = settled(Stream::kCameraInfo) || passed(Stream::kCameraInfo);
+    bool used = true;
+    const bool camera_settled =
+        settled(Stream::kCameraInfo, stamp_ns, last_call) || passed(Stream::kCameraInfo, stamp_ns);
     if (!camera_at(stamp_ns, camera_settled, frame.camera)) {
       if (!camera_settled) {
         blocked_by_ = Stream::kCameraInfo;
         break;
       }
-      drop = &counts_.dropped_no_camera_info;
+      ++counts_.dropped_no_camera_info;
+      used = false;
     }
-    if (drop == nullptr) {
-      const bool pose_settled = settled(Stream::kPose);
-      const TransformLookup pose =
-          transforms_.lookup(config_.map_frame, config_.camera_frame, stamp_ns,
-                             pose_settled ? config_.extrapolation_ns : 0);
-      if (pose.result == PoseLookup::kFound) {
-        frame.T_W_C = pose.T_target_source;
-      } else if (!pose_settled &&
-                 (pose.result == PoseLookup::kTooNew || pose.result == PoseLookup::kEmpty)) {
-        blocked_by_ = Stream::kPose;
-        blocking_edge_ = pose.edge;
-        break;
-      } else {
-        drop = &counts_.dropped_no_pose;
-        // Images from before the first pose, and the last ones of a run, are nobody's mistake.
-        if (!last_call && pose.result != PoseLookup::kTooOld) {
-          pose_problem_ =
-              transforms_.explain(config_.map_frame, config_.camera_frame, stamp_ns, pose);
-        }
-      }
-    }
-    const SynchronizerCounts before = counts_;
-    if (drop == nullptr &&
-        !(fetch(config_.segmentation, Stream::kSegmentation, segmentation_, frame.labels,
-                counts_.without_segmentation, counts_.dropped_no_segmentation) &&
-          fetch(config_.color, Stream::kColor, color_, frame.color, counts_.without_color,
-                counts_.dropped_no_color))) {
-      // A frame that still waits for colour has not gone on without segmentation yet.
-      counts_.without_segmentation = before.without_segmentation;
+    if (used && !pose_at(stamp_ns, last_call, frame.T_W_C, used)) break;
+    Choice labels, color;
+    const auto waits = [&](StreamUse use, Stream stream, Choice& choice) {
+      if (!used || use == StreamUse::kAbsent) return false;
+      choice = choose(stream, stamp_ns, last_call);
+      if (choice.state == Choice::State::kWait) blocked_by_ = stream;
+      return choice.state == Choice::State::kWait;
+    };
+    if (waits(config_.segmentation, Stream::kSegmentation, labels) ||
+        waits(config_.color, Stream::kColor, color)) {
       break;
     }
+    if (used && config_.segmentation != StreamUse::kAbsent && labels.image.empty()) {
+      used = config_.segmentation == StreamUse::kOptional;
+      ++(used ? counts_.without_segmentation : counts_.dropped_no_segmentation);
+      lacks_mask(stamp_ns, used);
+    }
+    if (used && config_.color != StreamUse::kAbsent && color.image.empty()) {
+      used = config_.color == StreamUse::kOptional;
+      ++(used ? counts_.without_color : counts_.dropped_no_color);
+    }
+    use_up(Stream::kSegmentation, labels);
+    use_up(Stream::kColor, color);
     frame.depth = std::move(depth_.front().second);
+    frame.labels = labels.image;
+    frame.color = color.image;
     depth_.pop_front();
     watermark_ns_ = stamp_ns;
-    if (drop != nullptr) {
-      ++*drop;
-    } else {
-      ++counts_.complete;
-      frames.push_back(std::move(frame));
-    }
+    if (!used) continue;
+    ++counts_.complete;
+    frames.push_back(std::move(frame));
   }
   return frames;
 }
@@ -252,6 +331,8 @@ void TimeSynchronizer::restart() {
   color_.clear();
   infos_.clear();
   orders_.clear();
+  unstamped_info_.reset();
+  last_mask_ns_.reset();
   newest_pose_ns_.reset();
   watermark_ns_ = std::numeric_limits<StampNs>::min();
 }

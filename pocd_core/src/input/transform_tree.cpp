@@ -14,6 +14,12 @@ std::string seconds_text(StampNs stamp_ns) {
   return text;
 }
 
+/// No delay is so long.
+std::string clocks_text(const TransformLookup& failure) {
+  constexpr StampNs kNoDelay = 60'000'000'000;
+  return failure.off_ns > kNoDelay ? ": camera and poses have different clocks" : "";
+}
+
 InputProblem parent_changed(const std::string& child, const std::string& old_parent,
                             const std::string& parent) {
   return {InputReason::kParentChanged,
@@ -124,6 +130,8 @@ TransformLookup TransformTree::lookup(const std::string& target, const std::stri
     PoseQuaternion pose = edge->constant;
     if (!edge->is_static) {
       answer.result = edge->buffer.at(stamp_ns, extrapolation_ns, pose);
+      if (answer.result == PoseLookup::kTooNew) answer.off_ns = stamp_ns - edge->buffer.newest_ns();
+      if (answer.result == PoseLookup::kTooOld) answer.off_ns = edge->buffer.oldest_ns() - stamp_ns;
       if (answer.result != PoseLookup::kFound) return answer;
     }
     answer.T_target_source = to_pose(pose) * answer.T_target_source;
@@ -159,8 +167,12 @@ InputProblem TransformTree::explain(const std::string& target, const std::string
       return {InputReason::kNoPose,
               failure.edge + ": newest pose is of " +
                   (last == nullptr ? std::string("?") : seconds_text(last->buffer.newest_ns())) +
-                  ", the image of " + seconds_text(stamp_ns)};
+                  ", the image of " + seconds_text(stamp_ns) + clocks_text(failure)};
     case PoseLookup::kTooOld:
+      return {InputReason::kNoPose,
+              failure.edge + ": oldest pose is of " +
+                  (last == nullptr ? std::string("?") : seconds_text(last->buffer.oldest_ns())) +
+                  ", the image of " + seconds_text(stamp_ns) + clocks_text(failure)};
     case PoseLookup::kGap:
     case PoseLookup::kFound:
       break;

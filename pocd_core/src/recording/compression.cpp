@@ -5,6 +5,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <memory>
 
@@ -143,6 +144,40 @@ Bytes decompress(const std::string& compression, const std::uint8_t* data, std::
                              std::to_string(out_size) + " are announced");
   }
   return Bytes(data, data + size);
+}
+
+bool is_zstd(const std::uint8_t* data, std::size_t size) {
+  constexpr std::uint8_t kMagic[] = {0x28, 0xB5, 0x2F, 0xFD};
+  return size >= sizeof kMagic && std::equal(std::begin(kMagic), std::end(kMagic), data);
+}
+
+Bytes decompress_message(const std::uint8_t* data, std::size_t size, std::size_t most) {
+  const unsigned long long content = ZSTD_getFrameContentSize(data, size);
+  if (content == ZSTD_CONTENTSIZE_ERROR) throw DamagedData(0, "zstd: no frame");
+  if (content != ZSTD_CONTENTSIZE_UNKNOWN && content <= most) {
+    return decompress_zstd(data, size, static_cast<std::size_t>(content));
+  }
+  // Written as a stream: the size shows at the end only.
+  const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(),
+                                                                          &ZSTD_freeDStream);
+  POCD_CHECK(stream != nullptr);
+  Bytes out;
+  ZSTD_inBuffer input{data, size, 0};
+  for (std::size_t wanted = 1; wanted != 0;) {
+    const std::size_t before = out.size(), in_before = input.pos;
+    out.resize(before + ZSTD_DStreamOutSize());
+    ZSTD_outBuffer output{out.data() + before, out.size() - before, 0};
+    wanted = ZSTD_decompressStream(stream.get(), &output, &input);
+    if (ZSTD_isError(wanted)) {
+      throw DamagedData(input.pos, std::string("zstd: ") + ZSTD_getErrorName(wanted));
+    }
+    out.resize(before + output.pos);
+    if (out.size() > most) throw DamagedData(0, "zstd: the message is too large");
+    if (wanted != 0 && output.pos == 0 && input.pos == in_before) {
+      throw DamagedData(input.pos, "zstd: data ends early");
+    }
+  }
+  return out;
 }
 
 }  // namespace pocd::recording

@@ -25,7 +25,8 @@ std::string text(sqlite3_stmt* row, int column) {
 
 class Db3Reader : public RecordingReader {
  public:
-  Db3Reader(const std::filesystem::path& file, const ReaderLimits& limits) : name_(file.string()) {
+  Db3Reader(const std::filesystem::path& file, const std::string& name, const ReaderLimits& limits)
+      : name_(name) {
     sqlite3* raw = nullptr;
     const int result = sqlite3_open_v2(file.c_str(), &raw, SQLITE_OPEN_READONLY, nullptr);
     database_.reset(raw);
@@ -68,7 +69,7 @@ class Db3Reader : public RecordingReader {
       message.publish_time_ns = message.log_time_ns;
       message.data = static_cast<const std::uint8_t*>(sqlite3_column_blob(messages_.get(), 2));
       message.size = static_cast<std::size_t>(sqlite3_column_bytes(messages_.get(), 2));
-      return true;
+      if (unpack(message, name_)) return true;
     }
     return false;
   }
@@ -150,8 +151,8 @@ class Db3Reader : public RecordingReader {
 }  // namespace
 
 std::unique_ptr<RecordingReader> open_db3(const std::filesystem::path& file,
-                                          const ReaderLimits& limits) {
-  return std::make_unique<Db3Reader>(file, limits);
+                                          const std::string& name, const ReaderLimits& limits) {
+  return std::make_unique<Db3Reader>(file, name, limits);
 }
 
 }  // namespace pocd::recording

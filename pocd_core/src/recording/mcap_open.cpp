@@ -2,6 +2,7 @@
 // through.
 #include <algorithm>
 #include <cstdlib>
+#include <set>
 
 #include "compression.hpp"
 #include "pocd/recording/mcap_reader.hpp"
@@ -39,8 +40,7 @@ bool McapReader::read_summary() {
   const FooterRecord footer = parse_footer(in);
   if (footer.summary_start == 0) return false;  // allowed: a file without summary
   try {
-    read_summary_records(footer, footer_offset);
-    return true;
+    if (read_summary_records(footer, footer_offset)) return true;
   } catch (const DamagedData& damage) {
     note(damage.offset(),
          std::string("summary is damaged: ") + damage.what() + "; reading the file through");
@@ -51,10 +51,11 @@ bool McapReader::read_summary() {
   channels_.clear();
   blocks_.clear();
   info_.chunks_by_compression.clear();
+  definition_bytes_ = 0;
   return false;
 }
 
-void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t footer_offset) {
+bool McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t footer_offset) {
   if (footer.summary_start < kMcapMagic.size() || footer.summary_start > footer_offset ||
       footer_offset - footer.summary_start > kLargestSummary) {
     throw DamagedData(footer_offset,
@@ -68,6 +69,7 @@ void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t 
   }
   ByteReader in(bytes.data(), length);
   std::optional<StatisticsRecord> statistics;
+  std::set<std::uint16_t> indexed;  // channels with messages
   const std::uint64_t problems_before = problem_count();
   while (in.remaining() > 0) {
     const std::uint64_t at = footer.summary_start + in.position();
@@ -75,7 +77,11 @@ void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t 
       const auto opcode = static_cast<Opcode>(in.number<std::uint8_t>());
       const ByteReader content = in.part(in.number<std::uint64_t>());
       if (opcode == Opcode::kSchema) define(parse_schema(content), at);
-      if (opcode == Opcode::kChannel) define(parse_channel(content), at);
+      if (opcode == Opcode::kChannel) {
+        const ChannelRecord channel = parse_channel(content);
+        if (channel.schema_id != 0 && schemas_.count(channel.schema_id) == 0) return false;
+        define(channel, at);
+      }
       if (opcode == Opcode::kStatistics) statistics = parse_statistics(content);
       if (opcode == Opcode::kChunkIndex) {
         const ChunkIndexRecord index = parse_chunk_index(content);
@@ -87,6 +93,7 @@ void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t 
         blocks_.push_back(
             {index.start_ns, index.end_ns, index.chunk_offset, index.chunk_length, true});
         ++info_.chunks_by_compression[index.compression];
+        for (const auto& [channel, offset] : index.message_index_offsets) indexed.insert(channel);
       }
     } catch (const DamagedData& damage) {
       throw DamagedData(at, damage.what());
@@ -95,11 +102,11 @@ void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t 
   if (problem_count() != problems_before) {
     throw DamagedData(footer.summary_start, "its records contradict each other");
   }
-  // Messages may stand outside of chunks, and a summary need not repeat definitions or count.
+  // Messages may stand outside of chunks, and a summary need not repeat anything: only one that
+  // accounts for all of them will do. Channels and chunks without messages may be left out.
   if (!statistics || statistics->chunks != blocks_.size() ||
-      (blocks_.empty() && statistics->messages > 0) ||
-      statistics->channels != channel_records_.size()) {
-    throw DamagedData(footer.summary_start, "it does not list all chunks and channels");
+      (blocks_.empty() && statistics->messages > 0) || !lists_channels_of(*statistics, indexed)) {
+    return false;
   }
   info_.messages = statistics->messages;
   info_.chunks = statistics->chunks;
@@ -109,6 +116,20 @@ void McapReader::read_summary_records(const FooterRecord& footer, std::uint64_t 
     const auto known = channel_index_.find(channel);
     if (known != channel_index_.end()) channels_[known->second].messages = count;
   }
+  return true;
+}
+
+bool McapReader::lists_channels_of(const StatisticsRecord& statistics,
+                                   const std::set<std::uint16_t>& indexed) const {
+  const auto known = [&](std::uint16_t channel) { return channel_index_.count(channel) > 0; };
+  std::uint64_t counted = 0;
+  for (const auto& [channel, count] : statistics.messages_of_channel) {
+    if (count > 0 && !known(channel)) return false;
+    counted += count;
+  }
+  // Who does not count by channel may have channels that are defined in the chunks only.
+  if (counted != statistics.messages) return false;
+  return std::all_of(indexed.begin(), indexed.end(), known);
 }
 
 bool McapReader::looks_like_chunk(std::uint64_t offset, const std::uint8_t* bytes) const {

@@ -204,6 +204,13 @@ void McapReader::load(const Block& block) {
 }
 
 bool McapReader::next(RecordedMessage& message) {
+  while (next_in_order(message)) {
+    if (unpack(message, name_)) return true;
+  }
+  return false;
+}
+
+bool McapReader::next_in_order(RecordedMessage& message) {
   if (current_slot_) {
     Loaded& last = loaded_[*current_slot_];
     if (last.next == last.entries.size()) {

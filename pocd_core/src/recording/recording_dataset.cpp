@@ -1,18 +1,17 @@
-// A recording as a source of frames: the same synchroniser, transforms and merging as on the bus,
-// fed in the order of the recording and without a clock.
+// A recording as a source of frames: the same streams, transforms and merging as on the bus, fed in
+// the order of the recording and without a clock.
 #include <algorithm>
-#include <deque>
 #include <optional>
+#include <set>
 
 #include "live_frames.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
 #include "pocd/input/frame_merger.hpp"
-#include "pocd/input/message_checks.hpp"
-#include "pocd/input/robot_topic.hpp"
-#include "pocd/recording/recording_reader.hpp"
+#include "pocd/input/robot_streams.hpp"
+#include "pocd/input/suggest_input.hpp"
+#include "pocd/recording/recording_files.hpp"
 #include "pocd/recording/ros_messages.hpp"
-#include "recorded_robot.hpp"
 
 namespace pocd {
 namespace {
@@ -25,34 +24,33 @@ constexpr std::size_t kMostBehind = 64;
 // Between two runs: longer than poses are interpolated over.
 constexpr StampNs kPause = 1'000'000'000;
 
-/// Throws what is wrong.
-template <class T>
-T good(Checked<T> checked) {
-  if (checked.problem) throw InputError(checked.problem->detail);
-  return std::move(*checked.value);
+Stream stream_of(InputStream stream) {
+  switch (stream) {
+    case InputStream::kDepth:
+      return Stream::kDepth;
+    case InputStream::kSegmentation:
+      return Stream::kSegmentation;
+    case InputStream::kColor:
+      return Stream::kColor;
+    case InputStream::kCameraInfo:
+      return Stream::kCameraInfo;
+    default:
+      return Stream::kPose;
+  }
 }
-
-enum class Use { kNone, kImage, kCameraInfo, kOdometry, kTf, kTfStatic };
-
-/// What one channel feeds.
-struct Feed {
-  Use use = Use::kNone;
-  Stream stream = Stream::kDepth;
-  std::string robot;
-};
 
 class RecordingDataset : public DatasetReader {
  public:
   explicit RecordingDataset(const DatasetOptions& options)
-      : options_(options.recording),
-        colours_(options.classes),
-        with_color_(options.with_color),
+      : input_(options.input),
+        labels_(options.classes),
+        topics_(input_),
+        counter_([this](const ProblemCounter::Entry& entry) { tell(entry); }),
+        transforms_(static_cast<StampNs>(input_.max_pose_gap_s * 1e9)),
+        files_(options.inputs),
         merger_(std::nullopt) {
-    for (const auto& input : options.inputs) {
-      for (const auto& file : recording_files(input)) files_.push_back(file);
-    }
-    find_robots();
-    if (options_.as_live) live_ = LiveFrames(files_);
+    find_robots(options.max_depth_m);
+    if (options.as_live) live_ = LiveFrames(files_.paths());
   }
 
   std::size_t size() const override { return frames_listed_; }
@@ -72,106 +70,160 @@ class RecordingDataset : public DatasetReader {
   }
 
  private:
+  using Feeds = std::vector<InputTopic>;
+
   /// Looks at the channels of all files, so that a robot is known before its first message.
-  void find_robots() {
-    std::map<std::string, RecordedStreams> robots;
-    std::vector<std::string> depth_topics;
-    for (const auto& file : files_) {
-      const auto reader = open_recording(file);
-      for (const RecordedChannel& channel : reader->channels()) {
-        if (channel.type != "sensor_msgs/msg/Image") continue;
-        if (const auto robot = robot_in(options_.depth, channel.topic)) {
-          robots[*robot];
+  void find_robots(double max_depth_m) {
+    std::vector<TopicInfo> seen;
+    std::set<std::string> robots;
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      for (const RecordedChannel& channel : files_.reader(i).channels()) {
+        const std::string topic = bus_name(channel.topic);
+        seen.push_back({topic, channel.type});
+        for (const InputTopic& to : topics_.find(topic)) {
+          if (to.stream != InputStream::kDepth || !fits(channel, to.stream)) continue;
+          robots.insert(to.robot);
           frames_listed_ += channel.messages;
-        }
-      }
-      for (const RecordedChannel& channel : reader->channels()) {
-        if (channel.messages == 0) continue;
-        for (auto& [name, streams] : robots) {
-          streams.segmentation |= robot_in(options_.segmentation, channel.topic) == name;
-          streams.color |= with_color_ && robot_in(options_.color, channel.topic) == name;
         }
       }
     }
     if (robots.empty()) {
-      throw InputError(files_.front().string() + ": no sensor_msgs/msg/Image on a topic " +
-                       options_.depth);
+      throw InputError(files_.path(0).string() + ": no depth images on " +
+                       bus_name(input_.topics.depth) + " (node.topics.depth); " +
+                       suggestion_text(seen));
     }
-    for (const auto& [name, streams] : robots) {
-      robots_.emplace(name, std::make_unique<RecordedRobot>(name, options_, streams));
+    const StreamContext context{input_, labels_, max_depth_m, transforms_, counter_};
+    for (const std::string& name : robots) {
+      RobotConfig config;
+      config.name = name;
+      for (const RobotConfig& named : input_.robots) {
+        if (named.name == name) config = named;
+      }
+      robots_.emplace(name, std::make_unique<RobotStreams>(config, context));
       merger_.set_live(name, true);
     }
+    for (const RobotConfig& named : input_.robots) {
+      if (robots_.count(named.name) > 0) continue;
+      skip(files_.path(0).string() + ": " + named.name + ": no depth images on " +
+           topic_of(input_, named, InputStream::kDepth) + "; " + suggestion_text(seen));
+    }
+    count_what_comes();
   }
 
-  Feed feed_of(const RecordedChannel& channel) const {
-    if (channel.message_encoding != "cdr" || is_instance_channel(channel)) return {};
-    const auto known = [&](const std::string& pattern) -> std::optional<std::string> {
-      const auto robot = robot_in(pattern, channel.topic);
-      return robot && robots_.count(*robot) ? robot : std::nullopt;
-    };
-    if (channel.type == "sensor_msgs/msg/Image") {
-      if (const auto robot = known(options_.depth)) return {Use::kImage, Stream::kDepth, *robot};
-      if (const auto robot = known(options_.segmentation)) {
-        return {Use::kImage, Stream::kSegmentation, *robot};
+  /// What there is will come, however far other streams run ahead; what has ended will not.
+  void count_what_comes() {
+    for (auto& [name, robot] : robots_) robot->synchronizer().set_patience(Patience::kEndless);
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      for (const RecordedChannel& channel : files_.reader(i).channels()) {
+        for (const InputTopic& to : feeds_of(channel)) count(to, channel.messages);
       }
-      const auto robot = known(options_.color);
-      if (robot && with_color_) return {Use::kImage, Stream::kColor, *robot};
-    } else if (channel.type == "sensor_msgs/msg/CameraInfo") {
-      if (const auto robot = known(options_.camera_info)) return {Use::kCameraInfo, {}, *robot};
-    } else if (channel.type == "nav_msgs/msg/Odometry") {
-      if (const auto robot = known(options_.odometry)) return {Use::kOdometry, {}, *robot};
-    } else if (channel.type == "tf2_msgs/msg/TFMessage") {
-      if (channel.topic == "/tf") return {Use::kTf, {}, ""};
-      if (channel.topic == "/tf_static") return {Use::kTfStatic, {}, ""};
     }
-    return {};
+    for (auto& [name, robot] : robots_) {
+      for (const Stream stream : {Stream::kSegmentation, Stream::kColor, Stream::kCameraInfo}) {
+        if (left_[{name, stream}] > 0) continue;
+        robot->synchronizer().set_patience(stream, Patience::kNone);
+      }
+    }
   }
 
-  static bool is_instance_channel(const RecordedChannel& channel) {
-    return channel.metadata.count("instances_of") > 0;
+  void count(const InputTopic& to, std::uint64_t messages) {
+    for (const auto& [name, robot] : robots_) {
+      if (to.robot.empty() || to.robot == name) left_[{name, stream_of(to.stream)}] += messages;
+    }
   }
 
-  /// False when there is no other file.
+  void came(const InputTopic& to) {
+    for (const auto& [name, robot] : robots_) {
+      if (!to.robot.empty() && to.robot != name) continue;
+      std::uint64_t& left = left_[{name, stream_of(to.stream)}];
+      if (left > 0 && --left == 0) {
+        robot->synchronizer().set_patience(stream_of(to.stream), Patience::kNone);
+      }
+    }
+  }
+
+  static bool fits(const RecordedChannel& channel, InputStream stream) {
+    return channel.type == ros_type(stream) ||
+           (is_image(stream) && channel.type == ros_type(stream, true));
+  }
+
+  Feeds feeds_of(const RecordedChannel& channel) const {
+    Feeds feeds;
+    if (channel.message_encoding != "cdr" || channel.metadata.count("instances_of") > 0) return {};
+    for (const InputTopic& to : topics_.find(bus_name(channel.topic))) {
+      const bool known = to.robot.empty() || robots_.count(to.robot) > 0;
+      if (known && fits(channel, to.stream)) feeds.push_back(to);
+    }
+    return feeds;
+  }
+
+  /// What would feed something, were it of another kind.
+  void name_misfits(const RecordedChannel& channel) {
+    if (channel.messages == 0 || channel.metadata.count("instances_of") > 0) return;
+    const std::string topic = bus_name(channel.topic);
+    for (const InputTopic& to : topics_.find(topic)) {
+      if (!fits(channel, to.stream)) {
+        counter_.count(topic, {InputReason::kWrongType,
+                               "has type " + channel.type + ", expected " + ros_type(to.stream)});
+      } else if (channel.message_encoding != "cdr") {
+        counter_.count(topic,
+                       {InputReason::kWrongType,
+                        "has messages in \"" + channel.message_encoding + "\", expected \"cdr\""});
+      }
+    }
+  }
+
   bool open_next_file() {
+    if (reader_ != nullptr) files_.close(next_file_ - 1);
+    reader_ = nullptr;
     if (next_file_ == files_.size()) return false;
-    file_ = files_[next_file_++].string();
-    reader_ = open_recording(file_);
+    file_ = files_.path(next_file_).string();
+    reader_ = &files_.reader(next_file_++);
     feeds_.clear();
-    reader_->select(
-        [this](const RecordedChannel& channel) { return feed_of(channel).use != Use::kNone; });
-    reader_->seek(0);
     reported_ = 0;
+    message_.reset();
+    for (const RecordedChannel& channel : reader_->channels()) name_misfits(channel);
     // The parts of one recording follow each other; another run is moved behind the one before.
-    const std::optional<StampNs> first_ns = first_stamp(file_);
     const std::optional<StampNs> last_ns = last_stamp();
-    if (first_ns && last_ns && *first_ns + shift_ns_ <= *last_ns) {
-      shift_ns_ = *last_ns + kPause - *first_ns;
+    if (last_ns) {
+      const std::optional<StampNs> first_ns = first_stamp();
+      if (first_ns && *first_ns + shift_ns_ <= *last_ns) shift_ns_ = *last_ns + kPause - *first_ns;
     }
+    reader_->select([this](const RecordedChannel& channel) { return !feeds_of(channel).empty(); });
+    reader_->seek(0);
     return true;
   }
 
   /// Stamp of the latest depth image of the run so far.
   std::optional<StampNs> last_stamp() const {
     std::optional<StampNs> last_ns;
-    for (const auto& [name, robot] : robots_) last_ns = std::max(last_ns, robot->newest_ns());
+    for (const auto& [name, robot] : robots_) {
+      last_ns = std::max(last_ns, robot->synchronizer().newest_ns(Stream::kDepth));
+    }
     return last_ns;
   }
 
-  /// Stamp of the first depth image in a file.
-  std::optional<StampNs> first_stamp(const std::string& file) const {
-    const auto reader = open_recording(file);
-    reader->select([this](const RecordedChannel& channel) {
-      const Feed to = feed_of(channel);
-      return to.use == Use::kImage && to.stream == Stream::kDepth;
+  std::optional<StampNs> first_stamp() {
+    reader_->select([this](const RecordedChannel& channel) {
+      const Feeds feeds = feeds_of(channel);
+      return std::any_of(feeds.begin(), feeds.end(),
+                         [](const InputTopic& to) { return to.stream == InputStream::kDepth; });
     });
     RecordedMessage message;
-    for (reader->seek(0); reader->next(message);) {
+    for (reader_->seek(0); reader_->next(message);) {
       try {
-        return decode_image(message.data, message.size).header.stamp_ns;
+        return image_of(message).header.stamp_ns;
       } catch (const DamagedData&) {
       }
     }
     return std::nullopt;
+  }
+
+  RosImage image_of(const RecordedMessage& message) const {
+    const bool compressed =
+        reader_->channels()[message.channel].type == ros_type(InputStream::kDepth, true);
+    return compressed ? decode_compressed_image(message.data, message.size)
+                      : decode_image(message.data, message.size);
   }
 
   void report_damage() {
@@ -180,57 +232,65 @@ class RecordingDataset : public DatasetReader {
     }
   }
 
-  const Feed& feed(std::size_t channel) {
-    while (feeds_.size() <= channel) feeds_.push_back(feed_of(reader_->channels()[feeds_.size()]));
+  const Feeds& feeds(std::size_t channel) {
+    while (feeds_.size() <= channel) {
+      feeds_.push_back(feeds_of(reader_->channels()[feeds_.size()]));
+    }
     return feeds_[channel];
   }
 
   void add(const RecordedMessage& message) {
-    const Feed& to = feed(message.channel);
-    const auto robot = robots_.find(to.robot);
-    switch (to.use) {
-      case Use::kNone:
-        return;
-      case Use::kImage: {
-        const RosImage image = decode_image(message.data, message.size);
-        cv::Mat pixels = to.stream == Stream::kDepth ? good(depth_image(view_of(image)))
-                         : to.stream == Stream::kColor
-                             ? good(color_image(view_of(image)))
-                             : good(label_image(view_of(image), colours_)).labels;
-        say(message, robot->second->add_image(to.stream, image.header.stamp_ns + shift_ns_,
-                                              image.header.frame_id, std::move(pixels)));
-        return;
+    const std::uint64_t refused_before = counter_.refused();
+    message_ = message;
+    for (const InputTopic& to : feeds(message.channel)) {
+      try {
+        add(message, to);
+      } catch (const DamagedData& damage) {
+        counter_.count(bus_name(reader_->channels()[message.channel].topic), "damaged",
+                       std::string(damage.what()) + " (byte " + std::to_string(damage.offset()) +
+                           " of the payload)",
+                       1);
+        ++skipped_;
       }
-      case Use::kCameraInfo: {
-        const RosCameraInfo info = decode_camera_info(message.data, message.size);
-        say(message,
-            robot->second->add_camera_info(info.header.stamp_ns + shift_ns_,
-                                           good(camera_model(info.width, info.height, info.k))));
-        return;
-      }
-      case Use::kOdometry:
-        say(message, robot->second->add_odometry(
-                         good(shifted(decode_odometry(message.data, message.size)))));
-        return;
-      case Use::kTf:
-      case Use::kTfStatic:
-        for (const RosTransform& transform : decode_tf(message.data, message.size)) {
-          add_transform(message, shifted(transform), to.use == Use::kTfStatic);
-        }
+      came(to);
     }
+    message_.reset();
+    skipped_ += counter_.refused() - refused_before;
   }
 
-  /// One of a message's transforms; what is wrong with it costs the others nothing.
-  void add_transform(const RecordedMessage& message, const Checked<StampedTransform>& transform,
-                     bool is_static) {
-    std::optional<InputProblem> problem = transform.problem;
-    if (transform.value) {
-      for (auto& [name, any] : robots_) {  // all are told the same, so one of them may say it
-        const auto found = any->add_transform(*transform.value, is_static);
-        if (found) problem = found;
+  void add(const RecordedMessage& message, const InputTopic& to) {
+    RobotStreams* robot =
+        to.robot.empty() && robots_.count("") == 0 ? nullptr : robots_.at(to.robot).get();
+    switch (to.stream) {
+      case InputStream::kDepth:
+      case InputStream::kSegmentation:
+      case InputStream::kColor: {
+        const RosImage image = image_of(message);
+        robot->add_image(stream_of(to.stream), image.header.stamp_ns + shift_ns_,
+                         image.header.frame_id, view_of(image));
+        return;
+      }
+      case InputStream::kCameraInfo: {
+        const RosCameraInfo info = decode_camera_info(message.data, message.size);
+        const StampNs stamp_ns = info.header.stamp_ns;
+        robot->add_camera_info(stamp_ns == 0 ? 0 : stamp_ns + shift_ns_, camera_model(info.fields));
+        return;
+      }
+      case InputStream::kOdometry:
+        robot->add_odometry(shifted(decode_odometry(message.data, message.size)));
+        return;
+      case InputStream::kTf:
+      case InputStream::kTfStatic: {
+        const bool is_static = to.stream == InputStream::kTfStatic;
+        statics_ += is_static;
+        const bool shared = to.robot.empty() && !input_.topics.own_tf();
+        TransformTree& tree = shared ? transforms_ : robot->own_transforms();
+        const std::string topic = bus_name(reader_->channels()[message.channel].topic);
+        for (const RosTransform& transform : decode_tf(message.data, message.size)) {
+          add_transform(shifted(transform), is_static, topic, tree, counter_);
+        }
       }
     }
-    say(message, problem);
   }
 
   Checked<StampedTransform> shifted(const RosTransform& message) const {
@@ -240,13 +300,11 @@ class RecordingDataset : public DatasetReader {
 
   void collect(bool last_call) {
     for (auto& [name, robot] : robots_) {
-      const std::size_t before = problems_.size();
-      for (Frame& frame : robot->take(last_call, problems_)) {
+      for (Frame& frame : robot->take(last_call)) {
         const StampNs stamp_ns = frame.stamp_ns;
         merger_.add(name, stamp_ns, std::move(frame));
       }
-      skipped_ += problems_.size() - before;
-      merger_.set_watermark(name, robot->watermark_ns());
+      merger_.set_watermark(name, robot->synchronizer().watermark_ns());
     }
   }
 
@@ -259,71 +317,73 @@ class RecordingDataset : public DatasetReader {
       if (auto frame = merger_.take(ended_ || far_behind)) return frame;
       if (ended_) return std::nullopt;
       RecordedMessage message;
-      if (reader_ && reader_->next(message)) {
-        try {
-          add(message);
-        } catch (const DamagedData& damage) {
-          skip_message(message, std::string(damage.what()) + " (byte " +
-                                    std::to_string(damage.offset()) + " of the payload)");
-        } catch (const InputError& error) {
-          skip_message(message, error.what());
-        }
+      if (reader_ != nullptr && reader_->next(message)) {
+        add(message);
         collect(false);
         continue;
       }
-      if (reader_) report_damage();
+      if (reader_ != nullptr) report_damage();
       if (open_next_file()) continue;
       ended_ = true;
       collect(true);
-      for (const auto& [name, robot] : robots_) {
-        const std::string losses = robot->losses();
-        if (!losses.empty()) problems_.push_back(losses);
-        skipped_ += robot->dropped();
-      }
+      report_losses();
     }
   }
 
-  std::string about(const RecordedMessage& message, const std::string& problem) const {
-    return file_ + ": " + reader_->channels()[message.channel].topic + " at " +
-           std::to_string(message.log_time_ns) + " ns: " + problem;
-  }
-
-  void skip_message(const RecordedMessage& message, const std::string& problem) {
-    skip(about(message, problem));
-  }
-
-  /// What was taken in spite of it is no message less.
-  void say(const RecordedMessage& message, const std::optional<InputProblem>& problem) {
-    if (!problem) return;
-    const bool taken = used_anyway(*problem);
-    if (taken) {
-      problems_.push_back(about(message, problem->detail));
-    } else {
-      skip_message(message, problem->detail);
+  void report_losses() {
+    bool no_transform = false;
+    for (const ProblemCounter::Entry& entry : counter_.entries()) {
+      no_transform = no_transform || entry.reason == to_string(InputReason::kNoTransform);
+      if (entry.count == 1) continue;
+      problems_.push_back(entry.topic + ": " + entry.reason + ": " + std::to_string(entry.count) +
+                          " times in all");
     }
+    if (no_transform && statics_ == 0) {
+      problems_.push_back(
+          bus_name(input_.topics.tf_static) +
+          ": the recording has no message on it: it is sent once, at the beginning, "
+          "so of a split recording the first part has it");
+    }
+    for (const auto& [name, robot] : robots_) {
+      const std::string losses = robot->losses();
+      if (!losses.empty()) problems_.push_back(losses);
+      skipped_ += robot->dropped();
+    }
+  }
+
+  void tell(const ProblemCounter::Entry& entry) {
+    const std::string at =
+        message_ ? " at " + std::to_string(message_->log_time_ns) + " ns" : std::string();
+    problems_.push_back((file_.empty() ? "" : file_ + ": ") + entry.topic + at + ": " +
+                        entry.reason + ": " + entry.detail);
   }
 
   void report_missing() {
     if (told_missing_ || live_->missing() == 0) return;
     told_missing_ = true;
-    skip(files_.front().string() + ": " + std::to_string(live_->missing()) +
+    skip(files_.path(0).string() + ": " + std::to_string(live_->missing()) +
          " frames were processed live, but the recording does not give them");
   }
 
-  RecordingOptions options_;
-  ColourTable colours_;
-  bool with_color_;
-  std::vector<std::filesystem::path> files_;
-  std::map<std::string, std::unique_ptr<RecordedRobot>> robots_;
+  const InputConfig input_;
+  const LabelTable labels_;
+  const InputTopics topics_;
+  ProblemCounter counter_;
+  TransformTree transforms_;  // of the topics that all robots share
+  RecordingFiles files_;
+  std::map<std::string, std::unique_ptr<RobotStreams>> robots_;
+  std::map<std::pair<std::string, Stream>, std::uint64_t> left_;  // messages still to come
   FrameMerger<Frame> merger_;
   std::size_t frames_listed_ = 0;
+  std::uint64_t statics_ = 0;
   std::optional<LiveFrames> live_;
   bool told_missing_ = false;
 
   std::size_t next_file_ = 0;
   std::string file_;
-  std::unique_ptr<RecordingReader> reader_;
-  std::vector<Feed> feeds_;
+  RecordingReader* reader_ = nullptr;
+  std::optional<RecordedMessage> message_;  // being added
+  std::vector<Feeds> feeds_;
   std::size_t reported_ = 0;
   StampNs shift_ns_ = 0;
   bool ended_ = false;

@@ -23,7 +23,7 @@ PoseQuaternion read_pose(CdrReader& in) {
 
 ImageView view_of(const RosImage& image) {
   return {image.width, image.height, image.encoding, image.is_bigendian != 0,
-          image.step,  image.data,   image.size};
+          image.step,  image.data,   image.size,     image.compressed};
 }
 
 RosImage decode_image(const std::uint8_t* data, std::size_t size) {
@@ -40,18 +40,34 @@ RosImage decode_image(const std::uint8_t* data, std::size_t size) {
   return image;
 }
 
+RosImage decode_compressed_image(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  RosImage image;
+  image.compressed = true;
+  image.header = read_header(in);
+  image.encoding = in.string();
+  image.size = in.length(1);
+  image.data = in.bytes(image.size);
+  return image;
+}
+
 RosCameraInfo decode_camera_info(const std::uint8_t* data, std::size_t size) {
   CdrReader in(data, size);
   RosCameraInfo info;
   info.header = read_header(in);
-  info.height = in.number<std::uint32_t>();
-  info.width = in.number<std::uint32_t>();
-  info.distortion_model = in.string();
-  info.d.resize(in.length(sizeof(double)));
-  for (double& value : info.d) value = in.number<double>();
-  for (double& value : info.k) value = in.number<double>();
-  for (int i = 0; i < 9 + 12; ++i) in.number<double>();        // r, p
-  for (int i = 0; i < 2 + 4; ++i) in.number<std::uint32_t>();  // binning, region of interest
+  CameraInfoFields& fields = info.fields;
+  fields.height = in.number<std::uint32_t>();
+  fields.width = in.number<std::uint32_t>();
+  in.string();  // distortion model
+  for (std::size_t left = in.length(sizeof(double)); left > 0; --left) in.number<double>();
+  for (double& value : fields.k) value = in.number<double>();
+  for (int i = 0; i < 9 + 12; ++i) in.number<double>();  // r, p
+  fields.binning_x = in.number<std::uint32_t>();
+  fields.binning_y = in.number<std::uint32_t>();
+  fields.roi_x = in.number<std::uint32_t>();
+  fields.roi_y = in.number<std::uint32_t>();
+  fields.roi_height = in.number<std::uint32_t>();
+  fields.roi_width = in.number<std::uint32_t>();
   in.boolean();
   return info;
 }

@@ -1,7 +1,10 @@
 #include "pocd/recording/split_writer.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
+
+#include "bag_metadata.hpp"
 
 namespace pocd::recording {
 
@@ -44,6 +47,7 @@ void SplitWriter::open_next() {
   const std::filesystem::path file = options_.splits() ? numbered(path_, files_.size()) : path_;
   writer_ = std::make_unique<McapWriter>(file, options_.mcap);
   files_.push_back(file);
+  counts_.push_back({});
   empty_ = true;
   for (const SchemaRecord& schema : schemas_) {
     writer_->add_schema(schema.name, schema.encoding, schema.data);
@@ -80,6 +84,7 @@ void SplitWriter::write(const MessageHeader& header, const std::uint8_t* data, s
       head_([&](MessageHeader first, const std::uint8_t* bytes, std::size_t count) {
         first.log_time_ns = header.log_time_ns;
         writer_->write(first, bytes, count);
+        count_message(first);
       });
       head_bytes_ = writer_->bytes_written() + writer_->bytes_held();
     }
@@ -87,6 +92,30 @@ void SplitWriter::write(const MessageHeader& header, const std::uint8_t* data, s
   if (empty_) first_ns_ = header.log_time_ns;
   empty_ = false;
   writer_->write(header, data, size);
+  count_message(header);
+}
+
+void SplitWriter::count_message(const MessageHeader& header) {
+  FileCount& file = counts_.back();
+  file.start_ns =
+      file.messages == 0 ? header.log_time_ns : std::min(file.start_ns, header.log_time_ns);
+  file.end_ns = std::max(file.end_ns, header.log_time_ns);
+  ++file.messages;
+  ++messages_of_[header.channel];
+}
+
+void SplitWriter::close() {
+  writer_->close();
+  if (!options_.splits()) return;
+  BagMetadata metadata;
+  metadata.schemas = schemas_;
+  metadata.channels = channels_;
+  metadata.messages = messages_of_;
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    const FileCount& count = counts_[i];
+    metadata.files.push_back({files_[i], count.start_ns, count.end_ns, count.messages});
+  }
+  listed_ = write_bag_metadata(path_.parent_path(), metadata);
 }
 
 }  // namespace pocd::recording

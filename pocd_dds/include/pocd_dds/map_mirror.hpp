@@ -11,6 +11,7 @@
 
 #include "pocd/map/map_delta.hpp"
 #include "pocd/pipeline/frame_result.hpp"
+#include "pocd_dds/callbacks.hpp"
 
 namespace pocd {
 
@@ -26,11 +27,15 @@ struct MirrorOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd_mirror";
-  std::uint32_t map_id = 0;  ///< the publisher's `node.map_id`
+  std::string security_folder;  ///< identity and permissions (docs/security.md); empty: no security
+  std::uint32_t map_id = 0;     ///< the publisher's `node.map_id`
   CatchUp catch_up = CatchUp::kEither;
-  /// Called for every event in order, by the mirror's thread, with the name of the object's class.
-  /// Events from before the mirror joined are not repeated.
+  /// Called for every event in order, by a thread of its own, with the name of the object's class.
+  /// Events from before the mirror joined are not repeated. It may be slow and may throw: the copy
+  /// goes on, and the status says so. The mirror's end waits until all that wait were called.
   std::function<void(const ObjectEvent&, const std::string& class_name)> on_event;
+  /// kWait: the copy waits as well, and is stale meanwhile.
+  CallbackOptions callbacks{10000, WhenFull::kDropOldest};
 };
 
 struct MirrorStatus {
@@ -52,6 +57,11 @@ struct MirrorStatus {
   std::uint64_t corrupt = 0;  ///< messages, of any topic, that could not be read or used
   std::uint64_t snapshots_asked = 0, snapshots_taken = 0;
   std::uint64_t gathered = 0;  ///< times that the copy was made of single tiles
+  CallbackStatus callbacks;
+  /// Turns of the mirror's thread that have failed, with the text of the last failure. The thread
+  /// goes on, and what it has missed is made up like anything else that is missing.
+  std::uint64_t failures = 0;
+  std::string last_failure;
 };
 
 struct MirrorContents {

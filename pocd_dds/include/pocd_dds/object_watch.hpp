@@ -8,6 +8,7 @@
 #include <string>
 
 #include "pocd/pipeline/frame_result.hpp"
+#include "pocd_dds/callbacks.hpp"
 
 namespace pocd {
 
@@ -25,13 +26,16 @@ enum class Gone {
   kReplaced
 };
 
-/// Callbacks may be empty. They are called one at a time, by the watch's thread, in the order in
-/// which the bus gives the samples of a topic; objects and events are two topics.
+/// Callbacks may be empty. They are called one at a time, by a thread of the watch, in the order in
+/// which the bus gives the samples of a topic; objects and events are two topics. They may be slow
+/// and may throw: the status says so, and the next ones are called. The watch's end waits until all
+/// that wait were called.
 struct ObjectWatchOptions {
   int domain = 0;             ///< 0 .. 232
   std::string profiles_file;  ///< XML profiles of the operator; empty: none
   std::string name = "pocd_object_watch";
-  std::uint32_t map_id = 0;  ///< the publisher's `node.map_id`
+  std::string security_folder;  ///< identity and permissions (docs/security.md); empty: no security
+  std::uint32_t map_id = 0;     ///< the publisher's `node.map_id`
   /// New, or changed. Who joins late gets all there are.
   std::function<void(const WatchedObject&)> on_object;
   /// With its last state. A node that ends or dies takes no object away: nobody has seen that the
@@ -39,6 +43,23 @@ struct ObjectWatchOptions {
   std::function<void(const WatchedObject&, Gone why)> on_gone;
   /// Events from before the watch joined are not repeated.
   std::function<void(const ObjectEvent&, const std::string& class_name)> on_event;
+  /// kWait: what the program is too slow for waits at the publisher, which keeps the last state of
+  /// each object and 1000 events: of states that follow one another some are left out, but never
+  /// the last one, nor that the object is gone. With the other two anything may be dropped.
+  CallbackOptions callbacks;
+  /// Objects known at a time; of more than these nothing is said, and they are counted. What is on
+  /// the bus is the peers' choice.
+  std::size_t most_objects = 100000;
+};
+
+struct WatchStatus {
+  std::size_t objects = 0;     ///< known now
+  std::uint64_t too_many = 0;  ///< samples of objects beyond `most_objects`
+  std::uint64_t corrupt = 0;   ///< samples that could not be read
+  std::string refused;         ///< whose samples are not read, being of another version of the type
+  CallbackStatus callbacks;
+  std::uint64_t failures = 0;  ///< turns of the watch's thread that have failed; it goes on
+  std::string last_failure;
 };
 
 /// Listens with a thread of its own, from construction on.
@@ -53,6 +74,8 @@ class ObjectWatch {
   /// A node that publishes this map is there, whatever other maps there are. False: nobody says
   /// what is there now, and what was heard may be out of date. Thread-safe.
   bool publisher_present() const;
+  /// Thread-safe.
+  WatchStatus status() const;
 
  private:
   struct Impl;

@@ -142,11 +142,16 @@ TEST(Camera, ValidatesEveryField) {
 // A camera info is held to the same bounds: a principal point far away would make a frame cost
 // gigabytes.
 TEST(Camera, InfoWithAnOffPrincipalPointIsRefused) {
-  const auto off = camera_model(640, 360, {461, 0, 1e7, 0, 461, 180, 0, 0, 1});
+  CameraInfoFields info;
+  info.width = 640;
+  info.height = 360;
+  info.k = {461, 0, 1e7, 0, 461, 180, 0, 0, 1};
+  const auto off = camera_model(info);
   ASSERT_TRUE(off.problem);
   EXPECT_EQ(off.problem->reason, InputReason::kBadIntrinsics);
   EXPECT_EQ(off.problem->detail, "camera cx = 10000000.000000, not in [-640.000000, 1280.000000]");
-  EXPECT_TRUE(camera_model(640, 360, {461, 0, 319.5, 0, 461, 180, 0, 0, 1}).value);
+  info.k[2] = 319.5;
+  EXPECT_TRUE(camera_model(info).value);
 }
 
 TEST(Camera, BackProjectsThroughThePrincipalPoint) {

@@ -4,6 +4,7 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/recording/ros_messages.hpp"
+#include "pocd/recording/recording_files.hpp"
 #include "recordings.hpp"
 
 namespace pocd::recording {

@@ -105,14 +105,14 @@ TEST(TriangleMesh, ACuboidLooksLikeTheAnalyticBox) {
   int hits = 0;
   for (int trial = 0; trial < 30; ++trial) {
     ScenePart box;
-    box.size_m = Eigen::Vector3d(random.uniform(0.1, 2), random.uniform(0.1, 2),
-                                 random.uniform(0.1, 2));
+    box.size_m =
+        Eigen::Vector3d(random.uniform(0.1, 2), random.uniform(0.1, 2), random.uniform(0.1, 2));
     ScenePart mesh = box;
     mesh.shape = Shape::kMesh;
     mesh.mesh = cuboid(box.size_m);
-    const Pose T_W_O = upright_pose({random.uniform(-1, 1), random.uniform(-1, 1), 4.0},
-                                    random.uniform(-3, 3)) *
-                       Eigen::AngleAxisd(random.uniform(-1, 1), Eigen::Vector3d::UnitX());
+    const Pose T_W_O =
+        upright_pose({random.uniform(-1, 1), random.uniform(-1, 1), 4.0}, random.uniform(-3, 3)) *
+        Eigen::AngleAxisd(random.uniform(-1, 1), Eigen::Vector3d::UnitX());
     const RenderedFrame a = render(scene_of(box, T_W_O), camera, Pose::Identity(), true);
     const RenderedFrame b = render(scene_of(mesh, T_W_O), camera, Pose::Identity(), true);
     int differ = 0;
@@ -177,7 +177,8 @@ TEST(TriangleMesh, DistanceIsThatToTheNearestTriangle) {
                             c = mesh.vertices()[t.z()];
       for (int i = 0; i <= 60; ++i) {
         for (int k = 0; i + k <= 60; ++k) {
-          const Eigen::Vector3f q = a + i / 60.0f * (b - a) + k / 60.0f * (c - a);
+          const Eigen::Vector3f q =
+              a + static_cast<float>(i) / 60.0f * (b - a) + static_cast<float>(k) / 60.0f * (c - a);
           lattice_m = std::min(lattice_m, (q.cast<double>() - p).norm());
         }
       }

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "pocd/datasets/recording_options.hpp"
 #include "pocd/input/frame.hpp"
+#include "pocd/input/input_config.hpp"
 #include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
@@ -70,10 +70,16 @@ struct DatasetOptions {
   /// class.
   int label_divisor = 1;
   std::string sensor;      ///< sim: "" as the scenario says, or "perfect", "stereo"
-  bool with_color = true;  ///< sim, mcap: colour images cost time
-  /// mcap: topics, and the colours of rgb8 masks.
-  RecordingOptions recording;
+  bool with_color = true;  ///< sim: colour images cost time
+  /// mcap: robots, topics, and how frames are put together, as on the bus.
+  InputConfig input;
+  /// mcap: classes of the masks.
   ClassMap classes;
+  /// mcap: no pixel beyond it is used [m].
+  double max_depth_m = 3.0;
+  /// mcap: only the frames that the component took while it was recorded, in its order, as the
+  /// topic pocd/frames says.
+  bool as_live = false;
 };
 
 /// Throws InputError: unknown format (listing the known ones), missing or empty folder, unreadable

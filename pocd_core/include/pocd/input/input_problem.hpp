@@ -10,7 +10,6 @@ namespace pocd {
 enum class InputReason {
   kEmptyImage,
   kUnknownEncoding,
-  kBigEndian,
   kStepTooSmall,
   kDataSize,
   kTooLarge,
@@ -33,6 +32,10 @@ enum class InputReason {
   kSilentStream,
   kIncompatibleQos,
   kCameraChanged,
+  kBadCompression,
+  kUnlistedClass,
+  kNoMask,
+  kNoUsableDepth,
 };
 const char* to_string(InputReason reason);  ///< "unknown_encoding", ...
 
@@ -43,9 +46,18 @@ struct InputProblem {
 
 /// Whether the data that the problem is about is used all the same.
 inline bool used_anyway(const InputProblem& problem) {
-  return problem.reason == InputReason::kParentChanged ||
-         problem.reason == InputReason::kStampsRestarted ||
-         problem.reason == InputReason::kCameraChanged;
+  switch (problem.reason) {
+    case InputReason::kParentChanged:
+    case InputReason::kStampsRestarted:
+    case InputReason::kCameraChanged:
+    case InputReason::kUnknownColour:
+    case InputReason::kUnlistedClass:
+    case InputReason::kNoMask:
+    case InputReason::kNoUsableDepth:
+      return true;
+    default:
+      return false;
+  }
 }
 
 /// A value, or what is wrong with the message that should have given it.

@@ -31,6 +31,7 @@ class PoseBuffer {
   PoseLookup at(StampNs stamp_ns, StampNs extrapolation_ns, PoseQuaternion& pose) const;
 
   bool empty() const { return entries_.empty(); }
+  StampNs oldest_ns() const { return entries_.front().stamp_ns; }
   StampNs newest_ns() const { return entries_.back().stamp_ns; }
 
  private:

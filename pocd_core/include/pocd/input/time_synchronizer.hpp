@@ -35,10 +35,11 @@ struct SynchronizerConfig {
   /// missing [ns of data time].
   StampNs max_wait_ns = 300'000'000;
   /// Largest difference of stamps that belong together [ns].
-  StampNs tolerance_ns = 1'000'000;
+  StampNs tolerance_ns = 10'000'000;
   /// How long the newest pose may be held when no later one comes [ns]; 0: never.
   StampNs extrapolation_ns = 0;
-  std::size_t capacity = 64;  ///< images kept per stream; the oldest goes first
+  /// Images kept per stream. When so many depth images wait, what the oldest lacks is missing.
+  std::size_t capacity = 64;
   std::string map_frame = "map";
   std::string camera_frame = "camera_color_optical_frame";
 };
@@ -80,6 +81,7 @@ class TimeSynchronizer {
   /// kStampBackwards, and nothing stored, when the stamp is not after the stream's newest one;
   /// kStampsRestarted: stored, and what the stream had at this stamp or later is dropped.
   std::optional<InputProblem> add_image(Stream stream, StampNs stamp_ns, cv::Mat image);
+  /// Intrinsics with stamp 0 hold from now on, until others come.
   std::optional<InputProblem> add_camera_info(StampNs stamp_ns, const CameraModel& camera);
   /// Tells how far the pose stream has come, for the bounded wait; `problem` is what the transforms
   /// said of the pose.
@@ -109,34 +111,58 @@ class TimeSynchronizer {
   std::optional<Stream> blocked_by() const { return blocked_by_; }
   /// When that is the pose: the transform that is not there yet, "parent -> child".
   const std::string& blocking_edge() const { return blocking_edge_; }
-  /// Why a frame that was waited for was dropped without pose, the last time since the call before.
-  std::optional<InputProblem> take_pose_problem() {
-    return std::exchange(pose_problem_, std::nullopt);
-  }
+  /// What frames lacked that have come out, or were dropped, since the call before: the pose, or a
+  /// mask although masks come. The first and the number of each kind.
+  struct Lack {
+    Stream stream;
+    InputProblem problem;
+    std::uint64_t times = 1;
+  };
+  std::vector<Lack> take_lacks() { return std::exchange(lacks_, {}); }
   /// "" or "waiting for <stream> since <stamp>" about the oldest frame that is not complete.
   std::string waiting_for() const;
   const SynchronizerCounts& counts() const { return counts_; }
 
  private:
+  template <class T>
+  using Queue = std::deque<std::pair<StampNs, T>>;
+  /// What a frame takes of one stream of images.
+  struct Choice {
+    enum class State { kFound, kWait, kMissing } state = State::kMissing;
+    StampNs stamp_ns = 0;  // of kFound
+    cv::Mat image;
+  };
+
   std::vector<SyncedFrame> run(bool last_call);
-  std::optional<cv::Mat> match(std::deque<std::pair<StampNs, cv::Mat>>& stream, StampNs stamp_ns);
+  bool settled(Stream stream, StampNs stamp_ns, bool last_call) const;
+  bool passed(Stream stream, StampNs stamp_ns) const;
+  Choice choose(Stream stream, StampNs stamp_ns, bool last_call);
+  /// The image of the choice and those before it are used up.
+  void use_up(Stream stream, const Choice& choice);
   bool camera_at(StampNs stamp_ns, bool settle, CameraModel& camera);
+  /// False: it has to be waited for. The frame is dropped when `found` is false.
+  bool pose_at(StampNs stamp_ns, bool last_call, Pose& T_W_C, bool& found);
   std::optional<InputProblem> judge(Stream stream, StampNs stamp_ns);
   void drop_beyond(Stream stream, StampNs stamp_ns);
   StampNs horizon_ns() const;
   bool wait_over(Stream stream, StampNs ahead_ns) const;
+  Queue<cv::Mat>& images_of(Stream stream);
+  void lacks(Stream stream, InputProblem problem);
+  void lacks_mask(StampNs stamp_ns, bool used);
 
   SynchronizerConfig config_;
   const TransformTree& transforms_;
-  std::deque<std::pair<StampNs, cv::Mat>> depth_, segmentation_, color_;
-  std::deque<std::pair<StampNs, CameraModel>> infos_;
+  Queue<cv::Mat> depth_, segmentation_, color_;
+  Queue<CameraModel> infos_;
+  std::optional<CameraModel> unstamped_info_;
   std::map<Stream, StampOrder> orders_;
   std::optional<StampNs> newest_pose_ns_;
+  std::optional<StampNs> last_mask_ns_;  // the last one that is not kept any more
   StampNs watermark_ns_ = std::numeric_limits<StampNs>::min();
   std::map<Stream, Patience> patience_;
   std::optional<Stream> blocked_by_;
   std::string blocking_edge_;  // of the pose
-  std::optional<InputProblem> pose_problem_;
+  std::vector<Lack> lacks_;
   SynchronizerCounts counts_;
 };
 

@@ -25,6 +25,7 @@ struct TransformLookup {
   PoseLookup result = PoseLookup::kEmpty;
   Pose T_target_source = Pose::Identity();
   std::string edge;
+  StampNs off_ns = 0;  ///< of kTooNew and kTooOld: how far the stamp lies beyond the poses
 };
 
 /// Every frame has one parent. Not thread-safe.

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <queue>
+#include <set>
 
 #include "pocd/recording/byte_source.hpp"
 #include "pocd/recording/mcap_records.hpp"
@@ -10,8 +11,8 @@
 
 namespace pocd::recording {
 
-/// With a summary only chunks that are due are read. Without one, or with one that is damaged, the
-/// file is read through once; after a damaged record it goes on with the next chunk that looks like
+/// With a summary that lists all chunks only those that are due are read. Without, or with one that
+/// is damaged (which is said), the file is read through once; after a damaged record it goes on with the next chunk that looks like
 /// one. A chunk whose CRC does not fit is left out as a whole.
 class McapReader : public RecordingReader {
  public:
@@ -56,7 +57,10 @@ class McapReader : public RecordingReader {
 
   void check_start();
   bool read_summary();
-  void read_summary_records(const FooterRecord& footer, std::uint64_t footer_offset);
+  /// False: it is whole, but does not say where all messages are. Throws DamagedData.
+  bool read_summary_records(const FooterRecord& footer, std::uint64_t footer_offset);
+  bool lists_channels_of(const StatisticsRecord& statistics,
+                         const std::set<std::uint16_t>& indexed) const;
   void scan();
   void scan_record(Opcode opcode, std::uint64_t offset, std::uint64_t length);
   std::uint64_t find_chunk(std::uint64_t from) const;
@@ -68,6 +72,7 @@ class McapReader : public RecordingReader {
   /// Entries of the selected channels at or after `from_`, or all of them while scanning.
   std::vector<Entry> entries_of(const Bytes& bytes, const Block& block, bool scanning);
   void load(const Block& block);
+  bool next_in_order(RecordedMessage& message);
   void note(std::uint64_t offset, const std::string& problem);
 
   std::unique_ptr<ByteSource> source_;

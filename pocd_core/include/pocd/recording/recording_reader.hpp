@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "pocd/recording/bytes.hpp"
+
 namespace pocd::recording {
 
 struct RecordedChannel {
@@ -82,7 +84,14 @@ class RecordingReader {
     if (problems_.size() < kMostProblems) problems_.push_back(problem);
   }
 
+  /// rosbag2 can compress messages one by one (no CDR begins like zstd): the message becomes what
+  /// it was. False, with a problem that begins with `name`, when that cannot be done.
+  bool unpack(RecordedMessage& message, const std::string& name);
+
  private:
+  static constexpr std::size_t kLargestMessage = 256u << 20;
+
+  Bytes unpacked_;
   std::function<bool(const RecordedChannel&)> wanted_;
   std::vector<bool> decided_;  // by channel
   std::vector<std::string> problems_;
@@ -94,13 +103,9 @@ struct ReaderLimits {
   std::uint64_t loaded_bytes = 1024u << 20;  ///< chunks that overlap in time, held at once
 };
 
-/// By what the file begins with: MCAP, or SQLite for rosbag2's .db3. Throws InputError naming the
-/// file when it cannot be read at all or is neither.
+/// By what the file begins with: MCAP, or SQLite for rosbag2's .db3; either may be compressed by
+/// zstd as a whole. Throws InputError naming the file when it cannot be read at all or is neither.
 std::unique_ptr<RecordingReader> open_recording(const std::filesystem::path& file,
                                                 const ReaderLimits& limits = {});
-
-/// The recordings that `input` stands for: itself, or the .mcap and .db3 files of a folder in the
-/// order of their names (numbers by value). Throws InputError when there are none.
-std::vector<std::filesystem::path> recording_files(const std::filesystem::path& input);
 
 }  // namespace pocd::recording

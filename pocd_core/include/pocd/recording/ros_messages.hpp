@@ -1,7 +1,6 @@
 // The ROS 2 messages that frames are made of, decoded from CDR.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -17,7 +16,8 @@ struct RosHeader {
   std::string frame_id;
 };
 
-/// `data` is a view into the payload.
+/// sensor_msgs/Image or, with `compressed`, CompressedImage: its format is the encoding. `data` is
+/// a view into the payload.
 struct RosImage {
   RosHeader header;
   std::uint32_t height = 0, width = 0;
@@ -26,14 +26,12 @@ struct RosImage {
   std::uint32_t step = 0;
   const std::uint8_t* data = nullptr;
   std::size_t size = 0;
+  bool compressed = false;
 };
 
 struct RosCameraInfo {
   RosHeader header;
-  std::uint32_t height = 0, width = 0;
-  std::string distortion_model;
-  std::vector<double> d;
-  std::array<double, 9> k{};
+  CameraInfoFields fields;
 };
 
 /// One transform T_parent_child; parent is header.frame_id. Values as they came, not checked.
@@ -43,11 +41,12 @@ struct RosTransform {
   PoseQuaternion T;
 };
 
-/// All throw DamagedData when the payload does not fit the type.
 /// For the checks; valid as long as `image` and its payload.
 ImageView view_of(const RosImage& image);
 
+/// All throw DamagedData when the payload does not fit the type.
 RosImage decode_image(const std::uint8_t* data, std::size_t size);
+RosImage decode_compressed_image(const std::uint8_t* data, std::size_t size);
 RosCameraInfo decode_camera_info(const std::uint8_t* data, std::size_t size);
 RosTransform decode_odometry(const std::uint8_t* data, std::size_t size);
 std::vector<RosTransform> decode_tf(const std::uint8_t* data, std::size_t size);

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <memory>
+#include <vector>
 
 #include "pocd/recording/mcap_writer.hpp"
 
@@ -38,14 +41,21 @@ class SplitWriter {
   static std::vector<std::filesystem::path> existing(const std::filesystem::path& path,
                                                      const SplitOptions& options);
   void flush() { writer_->flush(); }
-  void close() { writer_->close(); }
+  /// Of several files, also writes metadata.yaml beside them, with which rosbag2 opens the folder.
+  void close();
+  /// After close(): false when there is a metadata.yaml of other files, which was left alone.
+  bool listed() const { return listed_; }
 
   /// Of all files so far.
   std::uint64_t bytes_written() const { return bytes_before_ + writer_->bytes_written(); }
   const std::vector<std::filesystem::path>& files() const { return files_; }
 
  private:
+  struct FileCount {
+    std::uint64_t start_ns = 0, end_ns = 0, messages = 0;
+  };
   void open_next();
+  void count_message(const MessageHeader& header);
 
   std::filesystem::path path_;
   SplitOptions options_;
@@ -53,6 +63,9 @@ class SplitWriter {
   std::vector<ChannelRecord> channels_;
   std::unique_ptr<McapWriter> writer_;
   std::vector<std::filesystem::path> files_;
+  std::vector<FileCount> counts_;  // of each
+  std::map<std::uint16_t, std::uint64_t> messages_of_;
+  bool listed_ = true;
   std::uint64_t bytes_before_ = 0;
   std::uint64_t first_ns_ = 0;
   bool empty_ = true;  // no message in the present file

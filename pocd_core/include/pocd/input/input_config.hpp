@@ -1,14 +1,24 @@
-// Configuration of pocd_node: what the core needs, and where frames come from and results go to.
+// Where frames come from: robots, topics, and how their streams are put together. The same on the
+// bus and in recordings.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "pocd/config/describe.hpp"
-#include "pocd/pipeline/pipeline_config.hpp"
-#include "pocd_dds/entities/topic_table.hpp"
 
-namespace pocd::dds {
+namespace pocd {
+
+/// Names of the input topics as they are on the bus; {robot} is the robot's name.
+namespace input_names {
+inline constexpr char kDepth[] = "rt/{robot}/depth/image_raw";
+inline constexpr char kCameraInfo[] = "rt/{robot}/depth/camera_info";
+inline constexpr char kSegmentation[] = "rt/{robot}/segmentation";
+inline constexpr char kColor[] = "rt/{robot}/color/image_raw";
+inline constexpr char kOdometry[] = "rt/{robot}/odom";
+inline constexpr char kTf[] = "rt/tf";
+inline constexpr char kTfStatic[] = "rt/tf_static";
+}  // namespace input_names
 
 /// Where the camera sits when no tf_static says so.
 struct MountConfig {
@@ -32,11 +42,14 @@ struct MountConfig {
   std::vector<std::string> inconsistencies() const;
 };
 
-/// One robot with one camera. An empty topic means the pattern of TopicPatterns.
+/// One robot with one camera. An empty topic means the pattern of TopicPatterns. A robot with
+/// several cameras has an entry for each.
 struct RobotConfig {
   std::string name;
   std::string depth_topic, camera_info_topic, segmentation_topic, color_topic, odometry_topic;
+  std::string tf_topic, tf_static_topic;
   std::string camera_frame;
+  double depth_scale = 0.0;
   MountConfig mount;
 
   template <class Visitor>
@@ -49,20 +62,25 @@ struct RobotConfig {
           "Topic of the segmentation images; empty: by the pattern.");
     visit("color_topic", color_topic, "Topic of the colour images; empty: by the pattern.");
     visit("odometry_topic", odometry_topic, "Topic of the odometry; empty: by the pattern.");
+    visit("tf_topic", tf_topic, "Topic of the robot's own transforms; empty: by the pattern.");
+    visit("tf_static_topic", tf_static_topic,
+          "Topic of its static transforms; must be given where tf_topic is, and only there.");
     visit("camera_frame", camera_frame,
           "Optical frame of the depth camera; empty: what the depth images name.");
+    visit("depth_scale", depth_scale, Range{0.0, 1000.0},
+          "Factor on this robot's depth values; 0: node.depth_scale.");
     visit.group("mount", mount, "Where the camera is mounted.");
   }
 };
 
 struct TopicPatterns {
-  std::string depth = topics::kDepth.name;
-  std::string camera_info = topics::kCameraInfo.name;
-  std::string segmentation = topics::kSegmentation.name;
-  std::string color = topics::kColor.name;
-  std::string odometry = topics::kOdometry.name;
-  std::string tf = topics::kTf.name;
-  std::string tf_static = topics::kTfStatic.name;
+  std::string depth = input_names::kDepth;
+  std::string camera_info = input_names::kCameraInfo;
+  std::string segmentation = input_names::kSegmentation;
+  std::string color = input_names::kColor;
+  std::string odometry = input_names::kOdometry;
+  std::string tf = input_names::kTf;
+  std::string tf_static = input_names::kTfStatic;
 
   /// The patterns that name a topic of one robot.
   std::vector<std::string> of_each_robot() const {
@@ -73,7 +91,7 @@ struct TopicPatterns {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("depth", depth, "Depth images, 16UC1 [mm] or 32FC1 [m].");
+    visit("depth", depth, "Depth images: 16UC1 [mm], 32FC1 [m], or compressedDepth.");
     visit("camera_info", camera_info, "Intrinsics of the depth images.");
     visit("segmentation", segmentation, "Class images, registered to depth.");
     visit("color", color, "Colour images, registered to depth.");
@@ -83,67 +101,21 @@ struct TopicPatterns {
   }
 };
 
-/// Rates of the topics for others; 0 switches one off.
-struct RosOutputConfig {
-  double markers_hz = 1.0;
-  double occupancy_hz = 1.0;
-  double surface_hz = 0.5;
-  double obstacles_hz = 1.0;
-  double diagnostics_hz = 1.0;
-  double occupancy_low_m = 0.1;
-  double occupancy_high_m = 2.0;
-  int surface_points = 2'000'000;
-  double obstacle_lifetime_s = 3.0;
-  std::string topic_namespace = "pocd";
-  std::string level_name = "L1";
-
-  template <class Visitor>
-  void describe(Visitor& visit) {
-    visit("markers_hz", markers_hz, Range{0.0, 20.0}, "rt/pocd/objects/markers; 0: off [1/s].");
-    visit("occupancy_hz", occupancy_hz, Range{0.0, 20.0},
-          "rt/pocd/map and rt/pocd/map_updates, when the map has changed; 0: off [1/s].");
-    visit("surface_hz", surface_hz, Range{0.0, 20.0},
-          "rt/pocd/surface, while it has subscribers and when the map has changed; 0: off [1/s].");
-    visit("obstacles_hz", obstacles_hz, Range{0.0, 20.0}, "rt/rmf_obstacles; 0: off [1/s].");
-    visit("diagnostics_hz", diagnostics_hz, Range{0.0, 1.0}, "rt/diagnostics; 0: off [1/s].");
-    visit("occupancy_low_m", occupancy_low_m, Range{-100, 100},
-          "Lower end of the heights where a surface makes a cell of the grid occupied [m].");
-    visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
-          "Upper end of these heights [m].");
-    visit("surface_points", surface_points, Range{1000, 50'000'000},
-          "Most points of rt/pocd/surface; a larger surface is thinned.");
-    visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
-          "How long an obstacle that is not sent again stays with the fleet manager [s].");
-    visit("namespace", topic_namespace,
-          "Takes the place of pocd in the names of these topics, but for rt/rmf_obstacles and "
-          "rt/diagnostics, which several nodes may share.");
-    visit("level_name", level_name, "Level of the building that the obstacles are on (Open-RMF).");
-  }
-  std::vector<std::string> inconsistencies() const;
-};
-
-struct NodeConfig {
+/// Everything that says how messages become frames. A part of the group `node`.
+struct InputConfig {
   std::vector<RobotConfig> robots;
   bool discover_robots = false;
   TopicPatterns topics;
   std::string segmentation = "optional";
   std::string color = "absent";
   std::string map_frame = "map";
-  int map_id = 0;
   double sync_wait_s = 0.3;
-  double stamp_tolerance_s = 0.001;
+  double stamp_tolerance_s = 0.01;
   double extrapolation_s = 0.0;
   double max_pose_gap_s = 0.5;
   double merge_wait_s = 1.0;
-  double silent_wait_s = 10.0;
-  int queue_frames = 8;
-  bool lossless = false;
-  double object_period_s = 0.1;
-  double map_period_s = 0.5;
-  double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
-  bool use_clock = false;
-  RosOutputConfig outputs;
-  double shutdown_wait_s = 10.0;
+  double max_frame_rate_hz = 0.0;
+  double depth_scale = 1.0;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -151,13 +123,14 @@ struct NodeConfig {
           "The robots whose cameras are listened to; none: all that appear on the bus.");
     visit("discover_robots", discover_robots,
           "Beside the named robots, listen to all others that appear on the bus.");
-    visit.group("topics", topics, "Names of the input topics on the bus; {robot} is the name.");
+    visit.group("topics", topics,
+                "Names of the input topics on the bus; {robot} is the name. A ROS name (/a) means "
+                "rt/a. A topic that ends in /compressed or /compressedDepth is read as "
+                "sensor_msgs/CompressedImage.");
     visit("segmentation", segmentation, Choices{{"absent", "optional", "required"}},
           "Segmentation images: not looked at, waited for and gone on without, or necessary.");
     visit("color", color, Choices{{"absent", "optional", "required"}}, "The same for colour.");
     visit("map_frame", map_frame, "Frame of the map: root of the poses.");
-    visit("map_id", map_id, Range{0, 2'147'483'647},
-          "Number of the map in every message: nodes on one domain must have different ones.");
     visit("sync_wait_s", sync_wait_s, Range{0.0, 60.0},
           "How far newer data may run ahead of an incomplete frame [s of data time].");
     visit("stamp_tolerance_s", stamp_tolerance_s, Range{0.0, 1.0},
@@ -168,25 +141,12 @@ struct NodeConfig {
           "Poses further apart than this are not interpolated between [s].");
     visit("merge_wait_s", merge_wait_s, Range{0.0, 60.0},
           "How far robots may run ahead of one that is late [s of data time].");
-    visit("silent_wait_s", silent_wait_s, Range{0.1, 3600.0},
-          "A robot that sends no image for so long is not waited for by the others, and, in a "
-          "lossless run, a silent stream not by its frames [s].");
-    visit("queue_frames", queue_frames, Range{1, 10000},
-          "Frames waiting for the pipeline; the oldest is dropped and counted.");
-    visit("lossless", lossless,
-          "Reliable readers that hold the player back instead of dropping frames.");
-    visit("object_period_s", object_period_s, Range{0.0, 60.0},
-          "Least time between two samples of one object [s].");
-    visit("map_period_s", map_period_s, Range{0.0, 60.0}, "Least time between two map deltas [s].");
-    visit("map_rate_mb_s", map_rate_mb_s, Range{0.01, 1000.0},
-          "Most that map data takes of the network, all subscribers together, without what late "
-          "joiners of the tiles get [MB/s].");
-    visit("use_clock", use_clock,
-          "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
-          "use_sim_time).");
-    visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
-    visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
-          "How long to wait at the end for subscribers to acknowledge [s].");
+    visit("max_frame_rate_hz", max_frame_rate_hz, Range{0.0, 1000.0},
+          "Depth images of a robot beyond this rate of their stamps are left out; 0: none [1/s].");
+    visit(
+        "depth_scale", depth_scale, Range{1e-6, 1000.0},
+        "Factor on depth values: 1 for millimetres (16 bit) and metres (float), 0.1 for tenths of "
+        "a millimetre, 0.001 for float millimetres.");
   }
   std::vector<std::string> inconsistencies() const;
 
@@ -194,20 +154,8 @@ struct NodeConfig {
   /// changes. Throws InputError.
   void set_robots(const std::vector<std::string>& names);
 
-  /// Robots are found on the bus.
+  /// Robots are found by their topics.
   bool discovers() const { return robots.empty() || discover_robots; }
 };
 
-/// A configuration file: the pipeline's groups at the top, as for pocd_map, and the group `node`.
-struct NodeFile {
-  PipelineConfig pipeline;
-  NodeConfig node;
-
-  template <class Visitor>
-  void describe(Visitor& visit) {
-    pipeline.describe(visit);
-    visit.group("node", node, "The component on the bus.");
-  }
-};
-
-}  // namespace pocd::dds
+}  // namespace pocd

@@ -1,0 +1,116 @@
+// A configuration file: what the core needs, where frames come from, and how the component runs on
+// the bus. The offline commands read the same files and use what concerns frames.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pocd/config/describe.hpp"
+#include "pocd/input/input_config.hpp"
+#include "pocd/pipeline/pipeline_config.hpp"
+
+namespace pocd {
+
+/// Rates of the topics for others; 0 switches one off.
+struct RosOutputConfig {
+  double markers_hz = 1.0;
+  double occupancy_hz = 1.0;
+  double surface_hz = 0.5;
+  double obstacles_hz = 1.0;
+  double diagnostics_hz = 1.0;
+  double occupancy_low_m = 0.1;
+  double occupancy_high_m = 2.0;
+  int surface_points = 2'000'000;
+  double obstacle_lifetime_s = 3.0;
+  double rate_mb_s = 10.0;
+  std::string topic_namespace = "pocd";
+  std::string level_name = "L1";
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("markers_hz", markers_hz, Range{0.0, 20.0}, "rt/pocd/objects/markers; 0: off [1/s].");
+    visit("occupancy_hz", occupancy_hz, Range{0.0, 20.0},
+          "rt/pocd/map and rt/pocd/map_updates, when the map has changed; 0: off [1/s].");
+    visit("surface_hz", surface_hz, Range{0.0, 20.0},
+          "rt/pocd/surface, while it has subscribers and when the map has changed; 0: off [1/s].");
+    visit("obstacles_hz", obstacles_hz, Range{0.0, 20.0}, "rt/rmf_obstacles; 0: off [1/s].");
+    visit("diagnostics_hz", diagnostics_hz, Range{0.0, 1.0}, "rt/diagnostics; 0: off [1/s].");
+    visit("occupancy_low_m", occupancy_low_m, Range{-100, 100},
+          "Lower end of the heights where a surface makes a cell of the grid occupied [m].");
+    visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
+          "Upper end of these heights [m].");
+    visit("surface_points", surface_points, Range{1000, 50'000'000},
+          "Most points of rt/pocd/surface; a larger surface is thinned.");
+    visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
+          "How long an obstacle that is not sent again stays with the fleet manager [s].");
+    visit("rate_mb_s", rate_mb_s, Range{0.01, 1000.0},
+          "Most that grid and surface take of the network in the mean, all subscribers together; "
+          "beyond it they come less often [MB/s].");
+    visit("namespace", topic_namespace,
+          "Takes the place of pocd in the names of these topics, but for rt/rmf_obstacles and "
+          "rt/diagnostics, which several nodes may share.");
+    visit("level_name", level_name, "Level of the building that the obstacles are on (Open-RMF).");
+  }
+  std::vector<std::string> inconsistencies() const;
+};
+
+/// What only concerns the bus, beside the input.
+struct NodeConfig : InputConfig {
+  int map_id = 0;
+  double silent_wait_s = 10.0;
+  int queue_frames = 8;
+  bool lossless = false;
+  double object_period_s = 0.1;
+  double map_period_s = 0.5;
+  double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
+  bool use_clock = false;
+  RosOutputConfig outputs;
+  double shutdown_wait_s = 10.0;
+  double health_window_s = 10.0;
+  double stall_s = 10.0;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    InputConfig::describe(visit);
+    visit("map_id", map_id, Range{0, 2'147'483'647},
+          "Number of the map in every message: nodes on one domain must have different ones.");
+    visit("silent_wait_s", silent_wait_s, Range{0.1, 3600.0},
+          "A robot that sends no image for so long is not waited for by the others, and, in a "
+          "lossless run, a silent stream not by its frames [s].");
+    visit("queue_frames", queue_frames, Range{1, 10000},
+          "Frames waiting for the pipeline; the oldest is dropped and counted.");
+    visit("lossless", lossless,
+          "Reliable readers that hold the player back instead of dropping frames.");
+    visit("object_period_s", object_period_s, Range{0.0, 60.0},
+          "Least time between two samples of one object [s].");
+    visit("map_period_s", map_period_s, Range{0.0, 60.0}, "Least time between two map deltas [s].");
+    visit("map_rate_mb_s", map_rate_mb_s, Range{0.01, 1000.0},
+          "Most that map data takes of the network, all subscribers together, without what late "
+          "joiners of the tiles get [MB/s].");
+    visit("use_clock", use_clock,
+          "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
+          "use_sim_time).");
+    visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
+    visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
+          "How long to wait at the end for subscribers to acknowledge [s].");
+    visit("health_window_s", health_window_s, Range{0.1, 3600.0},
+          "How long something that went wrong counts for the level of pocd/health [s].");
+    visit("stall_s", stall_s, Range{0.1, 3600.0},
+          "A thread of the node that has not ended a turn for so long hangs: level 2, and not "
+          "ready [s].");
+  }
+};
+
+/// A configuration file: the pipeline's groups at the top, and the group `node`.
+struct NodeFile {
+  PipelineConfig pipeline;
+  NodeConfig node;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    pipeline.describe(visit);
+    visit.group("node", node, "Where frames come from, and the component on the bus.");
+  }
+};
+
+}  // namespace pocd
