@@ -450,6 +450,20 @@ void ObjectTracker::confirm_objects(Step& step) {
   }
 }
 
+bool ObjectTracker::seen_apart(const Step& step, ObjectId a, ObjectId b) const {
+  const auto instance_of = [&](std::size_t p) {
+    return step.observations.list[step.parts[p].observation].instance;
+  };
+  for (std::size_t p = 0; p < step.parts.size(); ++p) {
+    if (step.owners[p] != a || instance_of(p) == 0) continue;
+    for (std::size_t q = 0; q < step.parts.size(); ++q) {
+      if (step.owners[q] == b && instance_of(q) != 0 && instance_of(q) != instance_of(p))
+        return true;
+    }
+  }
+  return false;
+}
+
 LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& found) {
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   const bool arrived = found.arrival == Arrival::kArrived;
@@ -457,7 +471,7 @@ LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& fo
   for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
     LibraryObject* other = library_.find(id);
     if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
-        other->looks_unobserved > 0) {
+        other->looks_unobserved > 0 || seen_apart(step, found.id, id)) {
       continue;
     }
     if (coincide(found, *other)) return other;

@@ -68,6 +68,8 @@ class ObjectTracker {
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects are one surface, known twice.
   bool coincide(const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether the frame's masks say that two objects are two things.
+  bool seen_apart(const Step& step, ObjectId a, ObjectId b) const;
   /// The known object that a new one, which nobody saw arrive, is another side of; or null.
   LibraryObject* whole_of(const Step& step, const LibraryObject& found);
   /// Takes the marked surfels out of the object and the map, and reports them as gone when they are
