@@ -123,11 +123,16 @@ const VoxelBlock* TsdfMap::find(const BlockKey& key) const {
   return nullptr;
 }
 
-std::optional<double> TsdfMap::distance_at(const Eigen::Vector3f& point_W, int min_weight) const {
+std::optional<double> TsdfMap::distance_at(const Eigen::Vector3f& point_W, int min_weight) {
   const TsdfConfig& config = impl_->config;
   const Eigen::Array3i voxel =
       (point_W.array() / static_cast<float>(config.voxel_size_m)).floor().cast<int>();
-  const std::uint32_t slot = impl_->store.find({voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3});
+  const BlockKey key{voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3};
+  std::uint32_t slot = impl_->store.find(key);
+  if (slot == BlockStore::kNoSlot && impl_->store.contains(key)) {
+    impl_->store.enter(*impl_->store.region(key.region()));
+    slot = impl_->store.find(key);
+  }
   if (slot == BlockStore::kNoSlot) return std::nullopt;
   const int i = (voxel.x() & 7) + 8 * ((voxel.y() & 7) + 8 * (voxel.z() & 7));
   const VoxelBlock& block = impl_->store.block(slot);

@@ -16,8 +16,8 @@ void Departures::forget(ObjectId id) {
       list_.end());
 }
 
-void Departures::count_asked_far(ObjectId id) {
-  for (Departure& d : list_) d.asked_far += d.id == id;
+void Departures::set_asked_far(ObjectId id) {
+  for (Departure& d : list_) d.asked_far |= d.id == id;
 }
 
 void Departures::set_clock_back(StampNs latest_ns) {

@@ -26,7 +26,7 @@ constexpr double kShortness = 0.5;
 /// Moves farther than that are told after this time: another thing may be nearer [s].
 constexpr double kFarWaitS = 1.0;
 /// Share of its length that a thing may have moved to be told so at once.
-constexpr double kAtOnceShare = 0.5;
+constexpr double kAtOnceShare = 1.0;
 constexpr std::size_t kAlignPoints = 600;
 
 double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
@@ -218,13 +218,18 @@ void ObjectTracker::find_far_moves(Step& step) {
   const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
   std::vector<Departure> due;
   for (const Departure& d : departures_.recent(now_ns, config_.state.relocation_window_s)) {
-    if (now_ns - d.departed_ns >= (wait_ns << d.asked_far)) due.push_back(d);
+    if (!d.asked_far && now_ns - d.departed_ns >= wait_ns) due.push_back(d);
   }
   for (const Departure& d : due) {
-    departures_.count_asked_far(d.id);
+    departures_.set_asked_far(d.id);
     Motion motion;
     if (LibraryObject* found = find_departed(step, d, motion))
       report_move(step, *found, d, motion.T_new_old, "found_again");
+  }
+  while (!arrivals_.empty() && now_ns - arrivals_.front().since_ns >= wait_ns) {
+    LibraryObject* object = library_.find(arrivals_.front().object);
+    arrivals_.pop_front();
+    if (object && object->added_ns) find_origin(step, *object);
   }
 }
 
@@ -234,6 +239,7 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   object.reported_box = object.box;
   object.lost = 0;
   object.added_ns = step.frame.stamp_ns;
+  arrivals_.push_back({object.id, step.frame.stamp_ns});
   mark_changed(object);
   add_event(step, EventKind::kAdded, object, to_string(object.arrival));
 }

@@ -309,10 +309,20 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
   departure.departed_ns = step.frame.stamp_ns;
   departure.seen_by = object.seen_by;
   departure.evidence = evidence_of(step, object);
+  if (object.belief.stationarity() < config_.state.remove_below) {
+    // That was measured of what is gone. The rest was measured in place.
+    begin_anew(step, object);
+  }
   add_event(step, EventKind::kUpdated, object, "part_removed").previous_box = whole_box;
   object.reported_box = object.box;
   object.lost = 0;
   depart(step, std::move(departure), rule);
+}
+
+void ObjectTracker::begin_anew(Step& step, LibraryObject& object) {
+  object.belief.alpha = config_.state.initial_stationarity * config_.state.initial_count;
+  object.belief.beta = (1.0 - config_.state.initial_stationarity) * config_.state.initial_count;
+  step.evidence.erase(object.id);
 }
 
 void ObjectTracker::clear_gone(Step& step, ObjectId id,
@@ -393,9 +403,7 @@ void ObjectTracker::remove_objects(Step& step) {
     mark_unseen(surfels, standing, gone);
     object->looks_unobserved = 0;
     lose_part(step, *object, gone, "stationarity_below_threshold");
-    // The rest was measured in place.
-    object->belief.alpha = config_.state.initial_stationarity * config_.state.initial_count;
-    object->belief.beta = (1.0 - config_.state.initial_stationarity) * config_.state.initial_count;
+    if (object->belief.stationarity() < config_.state.remove_below) begin_anew(step, *object);
   }
 }
 

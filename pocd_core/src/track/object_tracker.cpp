@@ -107,6 +107,7 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     object->moment = {};
   }
   departures_.set_clock_back(before_ns);
+  for (ArrivedObject& arrived : arrivals_) bound(arrived.since_ns);
 }
 
 void ObjectTracker::look_at_objects(Step& step) {
@@ -340,7 +341,7 @@ Arrival ObjectTracker::arrival_of(const LibraryObject& object) const {
   return share > 0.3 ? Arrival::kArrived : share > 0.1 ? Arrival::kUnknown : Arrival::kFound;
 }
 
-bool ObjectTracker::seen_empty(const TsdfMap& map, const Eigen::Vector3f& point_W) const {
+bool ObjectTracker::seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const {
   if (free_space_.seen_empty(point_W)) return true;
   // Near surfaces the map knows better.
   const auto distance_m = map.distance_at(point_W, FreeSpace::kLooks);

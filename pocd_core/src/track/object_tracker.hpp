@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <optional>
@@ -76,6 +77,8 @@ class ObjectTracker {
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
                  const std::string& rule);
+  /// Gives the rest of an object the belief of a new one.
+  void begin_anew(Step& step, LibraryObject& object);
   /// Clears the object's voxels where `inside` says so, but for those at which this frame or
   /// another object has a surface.
   void clear_gone(Step& step, ObjectId id,
@@ -93,7 +96,7 @@ class ObjectTracker {
                                   StampNs now_ns) const;
   /// The known or new object that is what departed, by the shortest motion; or null.
   LibraryObject* find_departed(const Step& step, const Departure& departure, Motion& motion);
-  /// Looks for what departed at a distance: after kFarWaitS, twice that, and so on.
+  /// Moves over a distance, once what departed and what arrived are known for kFarWaitS.
   void find_far_moves(Step& step);
   void report_move(Step& step, LibraryObject& found, const Departure& from, const Pose& T_new_old,
                    const std::string& rule);
@@ -101,7 +104,7 @@ class ObjectTracker {
   Evidence evidence_of(const Step& step, const LibraryObject& object) const;
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
                          const std::string& rule);
-  bool seen_empty(const TsdfMap& map, const Eigen::Vector3f& point_W) const;
+  bool seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const;
   Arrival arrival_of(const LibraryObject& object) const;
   /// Surfels that make a piece of surface of the least area that counts.
   std::size_t least_surfels() const;
@@ -110,6 +113,11 @@ class ObjectTracker {
   ObjectLibrary library_;
   FreeSpace free_space_;
   Departures departures_;
+  struct ArrivedObject {
+    ObjectId object;
+    StampNs since_ns;
+  };
+  std::deque<ArrivedObject> arrivals_;  ///< added, not asked yet whether they came from afar
   std::uint64_t next_event_ = 1;
   std::vector<Look> looks_;        ///< a frame uses the first ones; memory is kept between frames
   std::vector<ObjectId> changed_;  ///< since the last result

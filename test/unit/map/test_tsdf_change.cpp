@@ -155,7 +155,7 @@ TEST(TsdfChange, AShiftedSurfaceFollowsWithinAFewFrames) {
   for (const double shift_m : {-0.15, 0.15}) {
     TsdfMap map(coarse_config());
     for (int i = 0; i < 120; ++i) map.integrate(look({1.5, {}}, pose).input(), pool);
-    for (int i = 0; i < 8; ++i) map.integrate(look({1.5 + shift_m, {}}, pose).input(), pool);
+    for (int i = 0; i < 20; ++i) map.integrate(look({1.5 + shift_m, {}}, pose).input(), pool);
     const Mesh mesh = extract_mesh(map, 2, pool);
     int at_new = 0, before_new = 0;
     for (const Eigen::Vector3f& p : mesh.vertices_W) {

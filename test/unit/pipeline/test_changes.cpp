@@ -117,9 +117,9 @@ TEST(PipelineChanges, MovedBoxKeepsItsIdentityAndNamesBothPlaces) {
 }
 
 TEST(PipelineChanges, SmallMovesAreMovesToo) {
-  // Towards the camera: nothing of the old place is seen through. 10 cm is the least that changes
-  // an object instead of verifying it.
-  for (const double step_m : {0.15, 0.10}) {
+  // Towards the camera: nothing of the old place is seen through. Up to 10 cm, the margin of sight at
+  // voxels of 5 cm, a surface is in its place.
+  for (const double step_m : {0.20, 0.15}) {
     Drive drive;
     drive.watch(room_with({left_box(), right_cage()}), kLearn);
     const auto box = drive.object_at(-0.6, 2.3);

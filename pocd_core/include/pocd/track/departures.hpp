@@ -19,7 +19,7 @@ struct Departure {
   StampNs departed_ns = 0;  ///< found gone
   std::set<std::string> seen_by;
   Evidence evidence;
-  int asked_far = 0;  ///< so often objects at a distance were asked whether they are it
+  bool asked_far = false;  ///< objects at a distance were asked whether they are it
 };
 
 /// How a thing went from its old place to the new one.
@@ -35,7 +35,7 @@ class Departures {
   /// Those within `window_s` before `now_ns`; older ones are forgotten. Valid until the next call.
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
   void forget(ObjectId id);
-  void count_asked_far(ObjectId id);
+  void set_asked_far(ObjectId id);
   /// Nothing that is kept happened after `latest_ns`.
   void set_clock_back(StampNs latest_ns);
 
