@@ -1,15 +1,23 @@
 #!/usr/bin/env bash
 # Two simulated robots on the bus, the component, and a subscriber that mirrors its map. Between laps
 # boxes are moved, removed and added. Prints what the system said changed beside what really changed.
+# On a terminal the live page is up meanwhile, and stays until Ctrl-C.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 output=output/demo
 scenario=config/sim/demo.yaml
-if [[ $# -gt 0 ]]; then
-  echo "usage: demo.sh   (results in $output)" >&2
-  exit 2
-fi
+view=true
+[[ -t 1 ]] || view=false
+case "$*" in
+  "") ;;
+  --no-view) view=false ;;
+  --help | -h) echo "usage: demo.sh [--no-view]   (results in $output)" && exit 0 ;;
+  *)
+    echo "usage: demo.sh [--no-view]   (results in $output)" >&2
+    exit 2
+    ;;
+esac
 
 launch_scripts/install_dependencies.sh
 launch_scripts/build.sh
@@ -46,6 +54,22 @@ pocd_node "${bus[@]}" --config config/simulated.yaml --robot robot1 --robot robo
   >"$output/pocd_node.log" 2>&1 &
 node=$! && processes+=("$node")
 
+if $view; then
+  # Another program may have the usual port.
+  for port in 8080 0; do
+    pocd_view "${bus[@]}" --port "$port" >"$output/pocd_view.address" 2>"$output/pocd_view.log" &
+    page=$!
+    for ((tenth = 0; tenth < 100; ++tenth)); do
+      [[ -s "$output/pocd_view.address" ]] && break 2
+      kill -0 "$page" 2>/dev/null || break
+      sleep 0.1
+    done
+    kill "$page" 2>/dev/null || true
+  done
+  [[ -s "$output/pocd_view.address" ]] || failed pocd_view
+  processes+=("$page")
+  echo "live page: $(cat "$output/pocd_view.address")"
+fi
 echo "two robots drive three laps on domain $domain ..."
 pocd_play "${bus[@]}" --dataset sim --input "$scenario" --no-color --lossless --fast \
   >"$output/pocd_play.log" 2>&1 &
@@ -65,6 +89,7 @@ done
 kill -INT "$mirror" 2>/dev/null || true
 wait "$mirror" || failed pocd_mirror
 processes=()
+! $view || processes=("$page")
 
 tail -n 1 "$output/pocd_mirror.log"
 echo
@@ -72,3 +97,9 @@ pocd_demo_report --scenario "$scenario" --events "$output/events.csv" | tee "$ou
 echo
 echo "picture of the map: $output/birdseye.png (dashed red: where objects were; blue: new ones)"
 echo "surface: $output/map.ply   events: $output/events.csv   logs: $output/*.log"
+if $view; then
+  echo
+  echo "the page stays up at $(cat "$output/pocd_view.address"); Ctrl-C ends it"
+  trap 'exit 0' INT
+  wait "$page" || failed pocd_view
+fi

@@ -17,6 +17,8 @@ packages=(
   libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
   # simulator: rays on meshes
   libembree-dev
+  # live page
+  nlohmann-json3-dev libjs-three
   # tests and benchmarks
   libgtest-dev libbenchmark-dev iproute2 iptables openssl
   cyclonedds-dev cyclonedds-tools tshark

@@ -53,6 +53,11 @@ if command -v systemd-analyze >/dev/null; then
   [[ -z "$said" ]] || fail "systemd: $said"
 fi
 
+# The live page comes with its files.
+for file in index.html main.js three/build/three.module.js three/examples/jsm/controls/OrbitControls.js; do
+  cmp -s "$prefix/share/pocd_view/page/$file" "$root/usr/share/pocd_view/page/$file" || fail "pocd-tools lacks $file of the page"
+done
+
 # What is developed against it: a program of another project finds the CMake packages where they are.
 [[ -f $root/usr/lib/cmake/pocd_dds/pocd_ddsConfig.cmake && -f $root/usr/include/pocd_dds/map_mirror.hpp ]] ||
   fail "libpocd-dev lacks files"

@@ -1,0 +1,105 @@
+// Serves a page that shows the map, the objects and what changed, live.
+#include <boost/asio/ip/address.hpp>
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "apps/common.hpp"
+#include "view/server.hpp"
+
+namespace {
+
+struct Options {
+  pocd::view::FeedOptions feed;
+  pocd::view::ServerOptions server;
+};
+
+int serve(const Options& options) {
+  namespace view = pocd::view;
+  const view::StaticFiles files(view::StaticFiles::installed());
+  view::Board board;
+  view::Feed feed(options.feed, board);
+  pocd::dds::BusOptions bus{options.feed.domain, options.feed.profiles_file, ""};
+  bus.security_folder = options.feed.security_folder;
+  view::Relay relay(bus);
+  const view::Server server(options.server, files, board, &feed, relay);
+  const bool local = options.server.address == "127.0.0.1";
+  const bool v6 = options.server.address.find(':') != std::string::npos;
+  const std::string host = local ? "localhost"
+                           : v6  ? '[' + options.server.address + ']'
+                                 : options.server.address;
+  const std::string query = options.server.token.empty() ? "" : "?token=" + options.server.token;
+  std::printf("http://%s:%u/%s\n", host.c_str(), server.port(), query.c_str());
+  std::fflush(stdout);
+  if (!local && options.server.address != "::1" && options.server.token.empty()) {
+    spdlog::warn("everybody who reaches {} sees the map: --token asks for one",
+                 options.server.address);
+  }
+  while (!pocd::dds::stop_requested) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Serves a page that shows map, objects and changes as they come, and the same to viewers "
+      "that\n"
+      "speak the Foxglove WebSocket protocol. Prints its address.\n"
+      "Example: pocd_view --port 8080\n"
+      "Exit code: 0 ended by a signal, 1 it cannot listen or has no bus, 2 usage.",
+      "pocd_view");
+  Options options;
+  app.set_version_flag("--version", POCD_VERSION);
+  app.add_option("--address", options.server.address, "Address to listen on, 0.0.0.0 for all")
+      ->check([](const std::string& text) {
+        boost::system::error_code error;
+        boost::asio::ip::make_address(text, error);
+        return error ? "is no address of this machine like 127.0.0.1: " + text : std::string();
+      })
+      ->capture_default_str();
+  app.add_option("--port", options.server.port, "TCP port; 0 takes one that is free")
+      ->capture_default_str();
+  app.add_option(
+         "--token", options.server.token,
+         "Let only those in who give it in the page's address, ?token=...; letters, digits, - "
+         "and _")
+      ->envname("POCD_VIEW_TOKEN")
+      ->check([](const std::string& text) {
+        const bool plain = text.find_first_not_of(
+                               "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                               "0123456789-_") == std::string::npos;
+        return plain && !text.empty() ? std::string() : "has to be letters, digits, - and _";
+      });
+  app.add_option("--allow-origin", options.server.allowed_origins,
+                 "Origin of another page that may connect, like https://app.foxglove.dev; may be "
+                 "repeated");
+  app.add_option("--max-clients", options.server.most_clients, "Pages and viewers at once")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  app.add_option("--map-id", options.feed.map_id, "Which map: node.map_id of its publisher")
+      ->capture_default_str();
+  app.add_option("--map-frame", options.feed.map_frame, "Frame of the map: its node.map_frame")
+      ->capture_default_str();
+  app.add_option("--odometry-topic", options.feed.robots.odometry, "Of a robot, for its camera")
+      ->capture_default_str();
+  app.add_option("--camera-info-topic", options.feed.robots.camera_info,
+                 "Of a robot, for its camera")
+      ->capture_default_str();
+  int domain = -1;
+  pocd::dds::add_bus_options(app, domain, options.feed.profiles_file, options.feed.security_folder);
+  try {
+    app.parse(argc, argv);
+    options.feed.domain = domain >= 0 ? domain : pocd::dds::default_domain();
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const pocd::InputError& error) {
+    std::cerr << "pocd_view: " << error.what() << '\n';
+    return 2;
+  }
+  return pocd::dds::guarded("pocd_view", [&] {
+    pocd::dds::log_to_stderr("pocd_view");
+    pocd::dds::stop_on_signals();
+    return serve(options);
+  });
+}

@@ -1,0 +1,398 @@
+// The page: what comes in is put in its place, what a person does is carried out.
+import * as THREE from "./three/build/three.module.js";
+import { colourOfScore, rgbOf, themes } from "./colours.js";
+import { Connection } from "./connection.js";
+import { Health } from "./health.js";
+import { helpHtml, keyTable } from "./help.js";
+import { Labels } from "./labels.js";
+import { Lines } from "./lines.js";
+import { ObjectLayer, ObjectStore } from "./objects.js";
+import { Panel } from "./panel.js";
+import { Robots } from "./robots.js";
+import { Stage } from "./stage.js";
+import { Surface } from "./surface.js";
+import { TimeLine } from "./timeline.js";
+import { metres, timeText } from "./words.js";
+
+const $ = (id) => document.getElementById(id);
+let theme = themes.dark;
+let selected = null, following = null, measuring = null, fitted = false, wantsFit = true;
+let then = null;      // objects of another time: {stamp, objects}
+let before = null;    // those of the marker "since", for the left half
+let drawn = false, cut = Infinity, restored = false;
+
+const stage = new Stage($("canvas"));
+const store = new ObjectStore();
+const health = new Health();
+const connection = new Connection(use, (link) => health.setLink(link));
+const surface = new Surface(stage.scene, (list) => connection.wish("want", list));
+const layers = { now: new ObjectLayer(stage.scene), before: new ObjectLayer(stage.scene) };
+layers.before.group.visible = false;
+const robots = new Robots(stage.scene);
+const grid = new Lines(stage.scene);
+const tape = new Lines(stage.scene, true);
+const labels = new Labels($("labels"), stage);
+const panel = new Panel(store, { select, flyTo, inView });
+panel.wanted = askHistory;
+const time = new TimeLine(panel.events, timeChanged);
+
+function use(piece) {
+  if (piece.kind !== "json") {
+    surface.use(piece);
+    stage.askSoon();
+    return;
+  }
+  const json = piece.json;
+  switch (json.type) {
+    case "reset":
+      for (const part of [store, panel, health, robots, surface]) part.clear();
+      break;
+    case "status":
+      health.useStatus(json);
+      surface.setRun(json.run, json.voxel);
+      if (json.time) time.setRange(json.time);
+      $("empty").textContent = json.publisher_seen ? "The map is still empty." : "Waiting for a map on the bus ...";
+      break;
+    case "health": health.useNode(json); break;
+    case "robot": robots.use(json); break;
+    case "object":
+      store.use(json, performance.now());
+      if (json.id === selected) askHistory(json.id);
+      panel.dirty = true;
+      break;
+    case "event":
+      panel.addEvent(json);
+      time.dirty = true;
+      break;
+    case "history": panel.addHistory(json); break;
+    case "then":
+      if (time.at !== null && Math.abs(json.stamp - time.at) < 1e-3) then = json;
+      if (Math.abs(json.stamp - time.sinceStamp()) < 1e-3) before = json;
+      break;
+  }
+  drawn = false;
+}
+
+let historyTimer = null;
+function askHistory(id) {
+  if (historyTimer) return;
+  historyTimer = setTimeout(() => {
+    historyTimer = null;
+    if (selected) connection.send({ history: selected });
+  }, id === selected ? 250 : 0);
+}
+
+function select(id) {
+  selected = id;
+  panel.select(id);
+  if (id) connection.send({ history: id });
+  if (id && $("panel").classList.contains("low")) $("panel").className = "";
+  drawn = false;
+  saveLink();
+}
+
+function flyTo(box) {
+  if (!box) return;
+  wantsFit = false;
+  stage.look(box.slice(0, 3), Math.max(4, 4.5 * Math.max(...box.slice(4))));
+}
+
+function inView(box) {
+  const p = stage.project(box.slice(0, 3));
+  return Boolean(p && p.inside);
+}
+
+let thenTimer = null;
+function timeChanged() {
+  if (time.at === null) then = null;
+  // While a marker is dragged the server is asked ten times a second at most.
+  thenTimer ??= setTimeout(() => {
+    thenTimer = null;
+    if (time.at !== null) connection.send({ at: time.at });
+    if (stage.split) connection.send({ at: time.sinceStamp() });
+  }, 100);
+  panel.until = time.shown();
+  panel.dirty = true;
+  drawn = false;
+}
+
+/** The last event of each object that has changed between the marker and the time that is shown. */
+function changesShown() {
+  const since = time.sinceStamp(), until = time.shown(), last = new Map();
+  for (const event of panel.events.values()) {
+    if (event.kind === "UPDATED" || event.stamp < since || event.stamp > until) continue;
+    const first = last.get(event.id);
+    if (event.kind === "REMOVED" && first?.kind === "ADDED") last.delete(event.id);
+    else if (event.kind === "MOVED" && first?.kind === "ADDED") last.set(event.id, { ...event, kind: "ADDED" });
+    else if (event.kind === "MOVED" && first?.kind === "MOVED") last.set(event.id, { ...event, previous: first.previous });
+    else last.set(event.id, event);
+  }
+  return [...last.values()];
+}
+
+function drawObjects(now) {
+  panel.since = time.sinceStamp();
+  const changes = changesShown();
+  const live = store.list(now);
+  const objects = then ? then.objects.map((object) => ({ ...object, condition: "present" })) : live;
+  layers.now.draw(objects, changes, theme, selected);
+  if (stage.split) layers.before.draw((before?.objects ?? []).map((object) => ({ ...object, condition: "present" })), [], theme, selected);
+  surface.dim(then ? 1 : 0);
+  for (const object of live) surface.paint(object.run, object.number, object.condition === "unknown" ? null : colourOfScore(object.belief.v));
+  for (const object of store.gone.values()) surface.paint(object.run, object.number, null);
+  $("split-left").textContent = `before: ${timeText(time.sinceStamp())}`;
+  $("split-right").textContent = time.at === null ? "now" : timeText(time.at);
+  drawn = store.gliding.size === 0;
+}
+
+function pose(json) { return [json.position[0], json.position[1], json.position[2]]; }
+
+stage.resizers.push((width, height, pixels) => {
+  for (const one of [layers.now, layers.before, robots.lines, grid, tape]) one.resize(width, height, pixels);
+});
+stage.before.push((now) => {
+  if (!drawn) {
+    drawObjects(now);
+    if (drawn) stage.askSoon();
+    else stage.ask();  // a box glides
+  }
+  if (robots.draw(theme, following)) stage.askSoon();
+  const followed = following && robots.find(following);
+  if (followed && robots.moved) stage.follow(robots.moved.from, pose(followed));
+  robots.moved = null;
+  if (surface.update(stage.camera.position, Math.max(60, 6 * stage.camera.position.distanceTo(stage.controls.target)))) stage.askSoon();
+  time.draw(theme);
+  panel.update(time.range ? time.range[1] : 0);
+  return false;
+});
+stage.halves.push((part) => {
+  layers.now.group.visible = part !== "left";
+  layers.before.group.visible = part === "left";
+  robots.lines.mesh.visible = part !== "left" && robots.any && !then;
+});
+const rightLabels = () => layers.now.labels.concat(then ? [] : robots.labels, tapeLabels());
+stage.after.push(() => {
+  const placed = stage.split ? [{ labels: layers.before.labels, offset: 0 }, { labels: rightLabels(), offset: stage.partWidth }]
+    : [{ labels: rightLabels(), offset: 0 }];
+  labels.place(placed, selected);
+});
+
+// Several times a second: what depends on where the camera is, and the first picture.
+setInterval(() => {
+  surface.chooseDetail(stage.camera.position, stage.controls.target);
+  const bounds = surface.bounds();
+  $("empty").hidden = Boolean(bounds) || store.objects.size > 0;
+  health.show();
+  if (!bounds) return;
+  drawGrid(bounds);
+  if ((wantsFit && !stage.touched && !restored) && !(fitted && fitted.containsBox(bounds))) {
+    stage.fit(bounds, !fitted);
+    fitted = bounds.clone().expandByScalar(0.3);
+  }
+  const top = Math.max(0.1, bounds.max.z), share = Number($("cut-range").value) / 100;
+  const height = share >= 1 ? Infinity : bounds.min.z + share * (top - bounds.min.z);
+  if (height !== cut) {
+    cut = height;
+    surface.cutAbove(Number.isFinite(cut) ? cut : 1e6);
+    $("cut-value").textContent = Number.isFinite(cut) ? `${cut.toFixed(1)} m` : "off";
+    stage.ask();
+  }
+}, 250);
+
+/** Metres on the ground: every one of a room, every ten of a hall. */
+let gridded = "";
+function drawGrid(bounds) {
+  const step = Math.max(bounds.max.x - bounds.min.x, bounds.max.y - bounds.min.y) > 60 ? 10 : 1;
+  const [x0, y0] = [bounds.min.x, bounds.min.y].map((v) => step * Math.floor(v / step));
+  const [x1, y1] = [bounds.max.x, bounds.max.y].map((v) => step * Math.ceil(v / step));
+  const wanted = `${x0},${y0},${x1},${y1},${theme.grid}`;
+  if (wanted === gridded) return;
+  gridded = wanted;
+  grid.begin();
+  const rgb = rgbOf(theme.grid);
+  for (let x = x0; x <= x1; x += step) grid.add([x, y0, 0], [x, y1, 0], rgb, x % (5 * step) === 0 ? 1.6 : 1, 0.8);
+  for (let y = y0; y <= y1; y += step) grid.add([x0, y, 0], [x1, y, 0], rgb, y % (5 * step) === 0 ? 1.6 : 1, 0.8);
+  grid.end();
+  stage.ask();
+}
+
+function setTheme(name) {
+  theme = themes[name];
+  document.documentElement.dataset.theme = name;
+  stage.renderer.setClearColor(theme.ground, 1);
+  surface.setTheme(theme);
+  time.dirty = true;
+  drawn = false;
+  robots.dirty = true;
+  localStorage.setItem("theme", name);
+  stage.ask();
+}
+
+function press(id, on) { $(id).setAttribute("aria-pressed", on); }
+function hint(text) {
+  $("hint").textContent = text;
+  $("hint").hidden = !text;
+}
+
+const actions = {
+  home() {
+    wantsFit = true;
+    const bounds = surface.bounds();
+    if (bounds) stage.fit(bounds);
+  },
+  top() {
+    stage.setTop(!stage.top);
+    press("tool-top", stage.top);
+  },
+  follow() {
+    following = robots.next(following);
+    press("tool-follow", Boolean(following));
+    hint(following ? `Following ${following}: F takes the next one` : "");
+    const robot = following && robots.find(following);
+    if (robot) stage.look(pose(robot), 7);
+    robots.dirty = true;
+  },
+  measure() {
+    measuring = measuring ? null : [];
+    press("tool-measure", Boolean(measuring));
+    hint(measuring ? "Click two points on the surface" : "");
+    drawTape();
+  },
+  split() {
+    stage.split = !stage.split;
+    press("tool-split", stage.split);
+    $("split-line").hidden = !stage.split;
+    timeChanged();
+  },
+  theme() { setTheme(theme === themes.dark ? "light" : "dark"); },
+  async link() {
+    saveLink(true);
+    try {
+      await navigator.clipboard.writeText(location.href);
+      hint("The link to this view was copied");
+    } catch {
+      hint("The link to this view is in the address bar");
+    }
+    setTimeout(() => hint(""), 2500);
+  },
+  help() {
+    $("help").innerHTML = helpHtml();
+    if ($("help").open) $("help").close();
+    else $("help").showModal();
+  },
+  live() { time.live(); },
+  escape() {
+    if (measuring) actions.measure();
+    else if (selected) select(null);
+    else if (following) {
+      following = null;
+      press("tool-follow", false);
+      hint("");
+    }
+  },
+};
+for (const name of ["home", "top", "follow", "measure", "split", "theme", "link", "help"]) $(`tool-${name}`).addEventListener("click", actions[name]);
+
+addEventListener("keydown", (key) => {
+  if (key.target.matches("input, select, dialog *") || key.ctrlKey || key.metaKey || key.altKey) return;
+  const bound = keyTable.find((row) => row.keys.includes(key.key));
+  if (!bound) return;
+  if (key.key === " " && key.target.matches("button, summary")) return;
+  key.preventDefault();
+  if (bound.action) return actions[bound.action]();
+  const target = stage.controls.target, reach = stage.camera.position.distanceTo(target);
+  const ahead = target.clone().sub(stage.camera.position).setZ(0);
+  if (ahead.lengthSq() < 1e-6) ahead.set(0, 1, 0);
+  ahead.normalize().multiplyScalar(0.12 * reach);
+  const by = { ArrowUp: ahead, ArrowDown: ahead.clone().negate(), ArrowLeft: new THREE.Vector3(-ahead.y, ahead.x, 0), ArrowRight: new THREE.Vector3(ahead.y, -ahead.x, 0) }[key.key];
+  if (by) {
+    stage.follow([0, 0], [by.x, by.y]);
+  } else {
+    const zoom = key.key === "+" || key.key === "=" ? 0.8 : 1.25;
+    stage.camera.position.sub(target).multiplyScalar(zoom).add(target);
+    stage.controls.update();
+  }
+  stage.touched = true;
+});
+
+// A click is a press that does not move; a drag is the camera's.
+let pressedAt = null;
+$("canvas").addEventListener("pointerdown", (down) => { pressedAt = [down.clientX, down.clientY]; });
+$("canvas").addEventListener("pointerup", (up) => {
+  if (!pressedAt || Math.hypot(up.clientX - pressedAt[0], up.clientY - pressedAt[1]) > 6) return;
+  const { raycaster, part } = stage.rayAt(up.clientX, up.clientY);
+  const point = surface.hit(raycaster);
+  if (measuring) {
+    if (!point) return;
+    if (measuring.length === 2) measuring = [];
+    measuring.push(point.toArray());
+    drawTape();
+    return;
+  }
+  const limit = point ? point.distanceTo(raycaster.ray.origin) + 0.4 : Infinity;
+  select((part === "left" ? layers.before : layers.now).pick(raycaster.ray, limit));
+});
+
+function drawTape() {
+  tape.begin();
+  const rgb = rgbOf(theme.measure), points = measuring ?? [];
+  for (const [x, y, z] of points) {
+    tape.add([x - 0.08, y, z], [x + 0.08, y, z], rgb, 3);
+    tape.add([x, y - 0.08, z], [x, y + 0.08, z], rgb, 3);
+  }
+  if (points.length === 2) tape.add(points[0], points[1], rgb, 3);
+  tape.end();
+  stage.ask();
+}
+function tapeLabels() {
+  if (measuring?.length !== 2) return [];
+  const [a, b] = measuring;
+  const across = Math.hypot(a[0] - b[0], a[1] - b[1]), up = b[2] - a[2];
+  return [{ at: a.map((v, i) => (v + b[i]) / 2), text: `${metres(Math.hypot(across, up))}  (level ${metres(across)}, up ${up.toFixed(2)} m)`, kind: "measure", rank: 0 }];
+}
+
+// The address holds the view: camera, selection, times.
+function saveLink(now = false) {
+  clearTimeout(saveLink.timer);
+  const save = () => {
+    const camera = [...stage.camera.position.toArray(), ...stage.controls.target.toArray()].map((v) => v.toFixed(2)).join(",");
+    const parts = [["c", camera], ["sel", selected], ["t", time.at?.toFixed(3)], ["since", time.since?.toFixed(3)], ["split", stage.split ? 1 : null], ["top", stage.top ? 1 : null]];
+    history.replaceState(null, "", `#${parts.filter(([, v]) => v !== null && v !== undefined).map(([k, v]) => `${k}=${v}`).join("&")}`);
+  };
+  if (now) save();
+  else saveLink.timer = setTimeout(save, 400);
+}
+stage.controls.addEventListener("change", () => { if (stage.touched || !wantsFit) saveLink(); });
+
+function restoreLink() {
+  const parts = new URLSearchParams(location.hash.slice(1));
+  const camera = (parts.get("c") ?? "").split(",").map(Number);
+  if (camera.length === 6 && camera.every(Number.isFinite)) {
+    restored = true;
+    stage.camera.position.fromArray(camera);
+    stage.controls.target.fromArray(camera, 3);
+    if (parts.get("top")) {
+      stage.top = true;
+      stage.controls.enableRotate = false;
+      press("tool-top", true);
+    }
+    stage.controls.update();
+  }
+  if (parts.get("split")) actions.split();
+  if (parts.get("since")) time.since = Number(parts.get("since"));
+  const wanted = { id: parts.get("sel"), at: parts.has("t") ? Number(parts.get("t")) : null };
+  const wait = setInterval(() => {
+    if (!time.range) return;
+    if (wanted.id && !store.find(wanted.id) && performance.now() < 10000) return;
+    clearInterval(wait);
+    if (wanted.id) select(wanted.id);
+    if (Number.isFinite(wanted.at) && wanted.at !== null) time.goTo(wanted.at);
+  }, 150);
+}
+
+setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
+restoreLink();
+
+// For tests and the curious: what the page knows.
+window.pocd = { stage, store, surface, panel, time, health, robots, connection, select, actions,
+  shown: () => ({ then: Boolean(then), count: then ? then.objects.length : store.objects.size }) };

@@ -1,0 +1,153 @@
+// The page in a browser, while the component runs, is killed and starts again. Screenshots go to FOLDER.
+// Usage: page.js CHROMIUM FOLDER
+"use strict";
+const fs = require("fs");
+const path = require("path");
+const puppeteer = require("puppeteer-core");
+const { node, play, view, until, check, main } = require("./processes.js");
+
+const [chromium, folder] = process.argv.slice(2);
+
+main(async () => {
+  fs.mkdirSync(folder, { recursive: true });
+  const server = await view("--port", "0");
+  const port = new URL(server.address).port;
+  const browser = await puppeteer.launch({ executablePath: chromium, headless: true,
+    args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage"] });
+  const errors = [];
+  const elsewhere = [];
+  const open = async (width, height, more = {}) => {
+    const page = await browser.newPage();
+    await page.setViewport({ width, height, ...more });
+    page.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
+    page.on("pageerror", (error) => errors.push(String(error)));
+    page.on("request", (request) => { if (!request.url().startsWith(server.address) && !/^(data|blob):/.test(request.url())) elsewhere.push(request.url()); });
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "dark" }]);
+    await page.goto(server.address);
+    return page;
+  };
+  const page = await open(1280, 800);
+  const state = () => page.$eval("#state", (chip) => chip.textContent);
+  const shot = async (name, of = page) => {
+    await new Promise((resolve) => setTimeout(resolve, 900));  // a flight of the camera ends
+    await of.screenshot({ path: path.join(folder, `${name}.png`) });
+  };
+  const holds = (what, condition, ...values) => until(() => page.evaluate(condition, ...values), what);
+
+  await until(async () => (await state()) === "no map yet", "a page without a map says so");
+  await shot("waiting");
+
+  // A run: two robots, things that move, go and come.
+  let component = node("--robot", "robot1", "--robot", "robot2", "--lossless");
+  const player = play("config/sim/demo.yaml", "--lossless", "--fast");
+  await holds("tiles appear", () => window.pocd.surface.tileCount > 20);
+  await holds("objects appear", () => window.pocd.store.objects.size > 0);
+  await holds("robots appear", () => window.pocd.robots.robots.size === 2);
+  await until(async () => /in step/.test(await state()), "the page is in step");
+  await shot("live");
+  check((await player.ended) === 0, "the player ended in order");
+  await holds("a MOVED event comes", () => [...window.pocd.panel.events.values()].some((e) => e.kind === "MOVED"));
+  await holds("everything is drawn", () => window.pocd.health.status.in_step && !window.pocd.health.status.drawing);
+  const moved = await page.evaluate(() => {
+    const event = [...window.pocd.panel.events.values()].filter((e) => e.kind === "MOVED").at(-1);
+    const object = window.pocd.store.find(event.id);
+    return { id: event.id, stamp: event.stamp, from: event.previous, to: event.box, now: object.box };
+  });
+  check(Math.hypot(moved.now[0] - moved.from[0], moved.now[1] - moved.from[1]) > 0.3, "an object that moves moves");
+  const counts = await page.evaluate(() => ({ objects: window.pocd.store.objects.size, says: Number(document.querySelector("#count-objects").textContent), tiles: window.pocd.surface.tileCount, status: window.pocd.health.status.tiles }));
+  check(counts.objects === counts.says, "the page counts its objects");
+  await page.keyboard.press("Home");
+  await shot("after_the_run");
+
+  // A list entry leads there, and says why.
+  await page.click("#events button.MOVED");
+  await holds("the selected object's past comes", () => document.querySelector("#detail svg.curve path") !== null);
+  const why = await page.$eval("#detail", (detail) => detail.textContent);
+  check(/Measured change/.test(why) && /E\[v\]: 0\.\d+ before/.test(why), "the evidence is told in words and numbers");
+  await shot("moved_object");
+  const link = await page.evaluate(async () => {
+    await window.pocd.actions.link();
+    return location.href;
+  });
+  check(/sel=[0-9a-f]{32}/.test(link), "the address holds the selection");
+  const linked = await browser.newPage();
+  await linked.goto(link);
+  await until(() => linked.evaluate(() => window.pocd?.panel.selected), "a link restores the selection");
+  const cameras = await Promise.all([page, linked].map((one) => one.evaluate(() => window.pocd.stage.camera.position.toArray())));
+  check(cameras[0].every((v, i) => Math.abs(v - cameras[1][i]) < 0.02), "a link restores the camera");
+  await linked.close();
+
+  // A click on a box in the picture selects it.
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("t");
+  await page.keyboard.press("Home");
+  await holds("the camera has arrived", () => window.pocd.stage.top && !window.pocd.stage.flight);
+  const target = await page.evaluate(() => {
+    const rect = document.querySelector("#canvas").getBoundingClientRect();
+    const places = [...window.pocd.store.objects.values()].map(({ id, box }) => ({ id, p: window.pocd.stage.project([box[0], box[1], box[2] + box[6] / 2]) }));
+    const { id, p } = places.find((place) => place.p?.inside);
+    return { id, x: rect.left + p.x, y: rect.top + p.y };
+  });
+  await page.mouse.click(target.x, target.y);
+  await holds("a click on a box selects it", (id) => window.pocd.panel.selected === id, target.id);
+  await shot("top_view");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("t");
+
+  // The past.
+  const early = await page.evaluate(() => {
+    const [first, last] = window.pocd.time.range;
+    window.pocd.time.goTo(first + 0.2 * (last - first));
+    return window.pocd.time.at;
+  });
+  await holds("the time line goes back", (at) => document.querySelector("#time-live").getAttribute("aria-pressed") === "false" && window.pocd.time.at === at, early);
+  await holds("fewer objects then than now", () => {
+    const shown = window.pocd.shown();
+    return shown.then && shown.count > 0 && shown.count < window.pocd.store.objects.size + 3;
+  });
+  await shot("then");
+  await page.keyboard.press("b");
+  await page.keyboard.press("Home");
+  await page.keyboard.press(" ");
+  await shot("before_and_after");
+  await page.keyboard.press("b");
+
+  await page.keyboard.press("d");
+  await shot("light");
+  await page.keyboard.press("?");
+  await shot("help");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("d");
+
+  const phone = await open(390, 844, { isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
+  await until(() => phone.evaluate(() => window.pocd.surface.tileCount > 20), "a phone gets the map");
+  check(await phone.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing sticks out on a phone");
+  await shot("phone", phone);
+  await phone.close();
+
+  // The component is killed: the page says so, and why; a new run leaves open what it has not seen.
+  const objects = await page.evaluate(() => window.pocd.store.objects.size);
+  await component.end("SIGKILL");
+  await until(async () => (await state()) === "stale", "stale shows when the node is killed");
+  check(await page.$eval("#alarm", (alarm) => !alarm.hidden && /Stale: because the publisher has gone/.test(alarm.textContent)), "the bar says what is wrong");
+  await shot("stale");
+  component = node("--robot", "robot1", "--robot", "robot2", "--lossless");
+  const again = play("config/sim/demo.yaml", "--lossless", "--fast", "--max-frames", "80");
+  check((await again.ended) === 0, "the player ended in order again");
+  await holds("what nobody has looked at since the restart", () => window.pocd.health.status.earlier_tiles > 0 && window.pocd.health.status.unknown_objects > 0);
+  check(objects > 0 && await page.$eval("#alarm", (alarm) => /Since the restart/.test(alarm.textContent)), "the bar says what is not known");
+  await page.keyboard.press("Home");
+  await shot("restarted");
+  await component.end();
+
+  // The server goes and comes: the page finds it by itself.
+  await server.end();
+  await until(async () => (await state()) === "no connection", "no connection is said");
+  const second = await view("--port", port);
+  await until(async () => (await state()) !== "no connection", "the page connects again by itself");
+  await second.end();
+  check(elsewhere.length === 0, `nothing is fetched from elsewhere: ${elsewhere}`);
+  const unexpected = errors.filter((text) => !/ERR_CONNECTION_REFUSED|WebSocket connection/.test(text));
+  check(unexpected.length === 0, `no error in the console: ${unexpected}`);
+  await browser.close();
+});
