@@ -12,6 +12,8 @@ namespace {
 constexpr int kSharedPoints = 10;
 /// Share of a found object that lies within another one's box when it is another side of it.
 constexpr double kInsideShare = 0.6;
+/// The same for one that arrived.
+constexpr double kWithinShare = 0.9;
 /// Two objects are one when this share of the smaller one lies on the other.
 constexpr double kSameShare = 0.5;
 /// A part that is smaller than this share of its object and of the least area that counts is an
@@ -483,18 +485,18 @@ LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& fo
       continue;
     }
     if (coincide(found, *other)) return other;
+    std::size_t inside = 0;
+    for (const Surfel& s : found.model.surfels())
+      inside += is_inside(other->box, margin_m, s.point_W);
+    const double share =
+        static_cast<double>(inside) / static_cast<double>(found.model.surfels().size());
+    // No other thing stands within a thing.
+    if (share >= kWithinShare) return other;
     // What arrived is a side of what arrived lately; what was found, of what stands longer, too.
     const bool other_arrived = other->arrival == Arrival::kArrived;
     const bool lately = other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns;
     if (arrived && !(other_arrived && lately)) continue;
-    if (connected(found, *other)) return other;
-    std::size_t inside = 0;
-    for (const Surfel& s : found.model.surfels())
-      inside += is_inside(other->box, margin_m, s.point_W);
-    if (static_cast<double>(inside) >=
-        kInsideShare * static_cast<double>(found.model.surfels().size())) {
-      return other;
-    }
+    if (connected(found, *other) || share >= kInsideShare) return other;
   }
   return nullptr;
 }

@@ -1,6 +1,8 @@
 // What the pipeline says when something changed, and what the map holds then.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "drive.hpp"
 
 namespace pocd {
@@ -237,8 +239,12 @@ TEST(PipelineChanges, OldThingsMoveAsNewOnesDo) {
   const auto moved = drive.of_kind(EventKind::kMoved);
   ASSERT_EQ(moved.size(), 1u) << text(drive.events());
   EXPECT_EQ(moved[0].object, box->id);
-  EXPECT_TRUE(drive.of_kind(EventKind::kRemoved).empty()) << text(drive.events());
-  EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << text(drive.events());
+  // It went farther than its own length: until nearer things had time to show, it is one that left
+  // and one that came.
+  const auto added = drive.of_kind(EventKind::kAdded);
+  ASSERT_EQ(added.size(), 3u) << text(drive.events());
+  EXPECT_EQ(moved[0].absorbed, added[2].object);
+  EXPECT_EQ(drive.pipeline().objects().size(), 2u);
 }
 
 // A replay that starts again: what is known is known from before, and its changes are found as if the
@@ -268,7 +274,15 @@ TEST(PipelineChanges, ClocksThatAreSetBackLoseNothing) {
   Drive steady, set_back;
   EXPECT_EQ(drive_with(0, steady), 20);
   EXPECT_EQ(drive_with(kHour, set_back), 11) << "nine frames may be another robot's wrong clock";
-  EXPECT_EQ(text(set_back.events()), text(steady.events()));
+  // Nine frames fewer were used: when a box is known better may differ, what changed does not.
+  const auto changes = [](const Drive& drive) {
+    std::vector<ObjectEvent> list = drive.events();
+    list.erase(std::remove_if(list.begin(), list.end(),
+                              [](const ObjectEvent& e) { return e.kind == EventKind::kUpdated; }),
+               list.end());
+    return text(list);
+  };
+  EXPECT_EQ(changes(set_back), changes(steady));
   EXPECT_EQ(set_back.of_kind(EventKind::kMoved).size(), 2u) << text(set_back.events());
   ASSERT_TRUE(set_back.object_at(-0.6, 1.5));
   EXPECT_LT(set_back.object_at(-0.6, 1.5)->last_seen_ns, kHour);
