@@ -196,7 +196,7 @@ TEST(ObjectModel, AddGivesBackWhatExtractTook) {
 TEST(ObjectModel, HitsCountFramesNotPoints) {
   ObjectModel model(kSpacing_m);
   std::vector<SurfacePoint> dense;
-  for (int i = 0; i < 50; ++i) dense.push_back(point(0.02f + 0.0002f * i, 0.02f, 0.02f));
+  for (int i = 0; i < 50; ++i) dense.push_back(point(0.02f + 0.0002f * static_cast<float>(i), 0.02f, 0.02f));
   model.fuse(dense, 100);
   ASSERT_EQ(model.surfels().size(), 1u);
   EXPECT_EQ(model.surfels()[0].hits, 1);
