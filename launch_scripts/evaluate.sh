@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 usage() {
   echo "usage: evaluate.sh [--quick | --ablation | --tune | --sensors] [ARGUMENT of pocd_evaluate...]"
   echo "  --quick     only the methods side by side, few scenarios, one seed"
-  echo "  --ablation  instead: our method with each improvement off, and as published with each on"
+  echo "  --ablation  instead: our method with each improvement that is a setting off"
   echo "  --sensors   instead: our method with other cameras, rates and errors than those it was made with"
   echo "  --tune      instead: search the thresholds of the other methods on the training scenes"
   echo "example: evaluate.sh --quick --methods pocd,submaps"
@@ -52,8 +52,7 @@ case "${1:-}" in
     exit ;;
 esac
 
-"$bin/pocd_evaluate" "${common[@]}" --variant published=config/published.yaml \
-  --output output/evaluation "$@"
+"$bin/pocd_evaluate" "${common[@]}" --output output/evaluation "$@"
 [[ ${1:-} == --quick ]] && exit
 for fault in pose_jumps mask_gaps depth_holes; do
   echo "nothing changes, with $fault:"
@@ -62,7 +61,8 @@ for fault in pose_jumps mask_gaps depth_holes; do
 done
 echo "scenes beyond the circuit:"
 "$bin/pocd_evaluate" "${common[@]}" --suite config/evaluation/beyond.yaml --no-reference --seeds 1 \
-  --variant published=config/published.yaml --output output/evaluation/beyond
+  --output output/evaluation/beyond
 echo "table top with toy cars:"
-"$bin/pocd_evaluate" --jobs "$(nproc)" --config config/toycar.yaml --suite config/evaluation/toytable.yaml \
+"$bin/pocd_evaluate" --jobs "$(nproc)" --config config/toycar.yaml \
+  --method-config config/evaluation/published_toycar.yaml --suite config/evaluation/toytable.yaml \
   --voxel-size 0.06 --min-height 0.72 --max-height 1.2 --output output/evaluation/toytable

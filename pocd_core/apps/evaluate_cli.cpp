@@ -7,8 +7,8 @@
 namespace pocd {
 namespace {
 
-const std::vector<std::string> kDefaultMethods{"pocd", "static_tsdf", "tracked_objects",
-                                               "voxel_correction", "submaps"};
+const std::vector<std::string> kDefaultMethods{"pocd",            "published",        "static_tsdf",
+                                               "tracked_objects", "voxel_correction", "submaps"};
 const std::vector<std::string> kFaults{"pose_jumps", "mask_gaps", "depth_holes"};
 
 }  // namespace
@@ -16,8 +16,7 @@ const std::vector<std::string> kFaults{"pose_jumps", "mask_gaps", "depth_holes"}
 int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
   CLI::App app(
       "Compares mapping methods on routes whose last part shows a changed place.\n"
-      "Example: pocd_evaluate --config config/simulated.yaml --variant "
-      "published=config/published.yaml "
+      "Example: pocd_evaluate --config config/simulated.yaml "
       "--seeds 1,2,3 --jobs 2 --output output/evaluation\n"
       "Recordings: pocd_evaluate --dataset torwic --input Scenario_1-1 --input Scenario_1-5 "
       "--config "
@@ -68,6 +67,10 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
       ->allow_extra_args(false);
   app.add_option("--config", o.config, "Configuration file; repeat it to overlay several")
       ->required()
+      ->allow_extra_args(false);
+  app.add_option("--method-config", o.method_config,
+                 "Parameters of the methods that ours is compared with, as "
+                 "config/evaluation/published_toycar.yaml; repeat it to overlay several")
       ->allow_extra_args(false);
   app.add_option("--set", o.overrides, "Override one parameter: GROUP.KEY=VALUE")
       ->allow_extra_args(false);

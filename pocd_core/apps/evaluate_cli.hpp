@@ -25,6 +25,7 @@ struct EvaluateOptions {
   std::vector<std::string> sim;
   std::vector<std::filesystem::path> config;
   std::vector<std::string> overrides;
+  std::vector<std::filesystem::path> method_config;
   std::filesystem::path output;
   int jobs = 1;
   bool quick = false;

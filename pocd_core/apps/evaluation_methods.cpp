@@ -4,12 +4,13 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
+#include "pocd/eval/published_method.hpp"
 
 namespace pocd {
 
 const std::vector<std::string>& method_names() {
   static const std::vector<std::string> names{
-      "pocd",    "static_tsdf",      "tracked_objects",
+      "pocd",    "published",        "static_tsdf",         "tracked_objects",
       "submaps", "voxel_correction", "tracked_objects_keep"};
   return names;
 }
@@ -24,7 +25,7 @@ MethodSpec make_method(const Variant& variant, const BaseConfig& base) {
   if (method == "pocd") {
     overrides.insert(overrides.end(), variant.set.begin(), variant.set.end());
   } else {
-    load_config(own, {}, variant.set);
+    load_config(own, base.method_files, variant.set);
   }
   load_config(config, files, overrides);
   MethodSpec spec;
@@ -35,6 +36,8 @@ MethodSpec make_method(const Variant& variant, const BaseConfig& base) {
     spec.make = [=] { return make_voxel_correction_method(config, own.voxel_correction); };
   } else if (method == "submaps") {
     spec.make = [=] { return make_submap_method(config, own.submaps); };
+  } else if (method == "published") {
+    spec.make = [=] { return make_published_method(config, own.published); };
   } else if (method == "pocd") {
     spec.make = [=] { return make_pocd_method(config); };
   } else {

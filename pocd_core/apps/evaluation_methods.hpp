@@ -10,7 +10,7 @@
 
 namespace pocd {
 
-/// pocd, static_tsdf, tracked_objects, tracked_objects_keep, submaps, voxel_correction.
+/// pocd, published, static_tsdf, tracked_objects, tracked_objects_keep, submaps, voxel_correction.
 const std::vector<std::string>& method_names();
 
 /// A method with other parameters.
@@ -42,6 +42,7 @@ struct VariantList {
 struct BaseConfig {
   std::vector<std::filesystem::path> files;
   std::vector<std::string> overrides;
+  std::vector<std::filesystem::path> method_files;  ///< of BaselineConfig
 };
 
 /// Throws InputError for wrong parameters.

@@ -57,7 +57,7 @@ std::vector<pocd::MethodSpec> list_methods(const pocd::EvaluateOptions& o) {
   }
   std::vector<pocd::MethodSpec> specs;
   for (const pocd::Variant& variant : variants) {
-    specs.push_back(pocd::make_method(variant, {o.config, o.overrides}));
+    specs.push_back(pocd::make_method(variant, {o.config, o.overrides, o.method_config}));
   }
   return specs;
 }

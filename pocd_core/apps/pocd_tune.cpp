@@ -165,7 +165,7 @@ int main(int argc, char** argv) {
         std::string text;
         for (const std::string& one : set) text += (text.empty() ? "" : " ") + one;
         candidates.push_back({method.name, set.empty() ? "defaults" : text, 0.0, {}});
-        specs.push_back(pocd::make_method({method.name, method.name, {}, set}, {config, {}}));
+        specs.push_back(pocd::make_method({method.name, method.name, {}, set}, {config, {}, {}}));
       }
     }
   } catch (const pocd::InputError& error) {

@@ -240,7 +240,7 @@ TEST(Node, IsHeardWhileItEmptiesItsQueue) {
   RobotSender sender(bus, "robot1");
   Process node(
       node_command(domain, {"--lossless", "--set", "node.queue_frames=1000", "--set",
-                            "node.segmentation=absent", "--set", "map.voxel_size_m=0.005"}));
+                            "node.segmentation=absent", "--set", "map.voxel_size_m=0.02"}));
   ASSERT_TRUE(eventually([&] { return sender.matched(); }));
   std::vector<pocd_msgs::msg::NodeHealth> heard;
   const auto hear = [&] {

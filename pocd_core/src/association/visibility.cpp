@@ -72,14 +72,14 @@ void touch(std::vector<Sighting::Touch>& touches, std::int32_t observation, bool
 
 }  // namespace
 
-void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
+void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_hits,
                   const OrganizedCloud& cloud, const DepthField& field,
                   const Observations& observations, const SightConfig& config,
                   const DepthNoise& noise, Sighting& out) {
   out.total = out.hit = out.seen_through = out.occluded = out.unknown = out.hit_other_class = 0;
   out.differences_m.clear();
   out.touches.clear();
-  out.sights.assign(model.surfels().size(), Sight::kOutOfView);
+  out.sights.assign(surfels.size(), Sight::kOutOfView);
   const Eigen::Isometry3f T_C_W = cloud.T_W_C.inverse().cast<float>();
   const Eigen::Vector3f eye_W = cloud.T_W_C.translation().cast<float>();
   const auto fx = static_cast<float>(cloud.camera.fx), fy = static_cast<float>(cloud.camera.fy);
@@ -88,8 +88,8 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
   const auto pose_px = static_cast<float>(config.pose_tolerance_m) * fx;
   constexpr float kMinDepth = 0.1f;
 
-  for (std::size_t k = 0; k < model.surfels().size(); ++k) {
-    const Surfel& surfel = model.surfels()[k];
+  for (std::size_t k = 0; k < surfels.size(); ++k) {
+    const Surfel& surfel = surfels[k];
     if (surfel.hits < min_hits) continue;
     ++out.total;
     const Eigen::Vector3f p_C = T_C_W * surfel.point_W;
@@ -98,18 +98,21 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
                        round_to_int(fy * p_C.y() / p_C.z() + cy), p_C.z()};
     if (at.col < 0 || at.row < 0 || at.col >= cloud.width || at.row >= cloud.height) continue;
     const Eigen::Vector3f ray = eye_W - surfel.point_W;
-    // Less than about six degrees between ray and surface measures nothing.
-    if (surfel.normal_W.dot(ray) < 0.1f * ray.norm() && surfel.normal_W.squaredNorm() > 0.5f)
-      continue;
+    // Less than about six degrees between ray and surface measures nothing of the surface; but what
+    // lies behind it is seen only when it is gone.
+    const bool turned_away =
+        surfel.normal_W.dot(ray) < 0.1f * ray.norm() && surfel.normal_W.squaredNorm() > 0.5f;
 
     const std::int32_t pixel = best_pixel(cloud, at);
     if (pixel < 0) {
+      if (turned_away) continue;
       out.sights[k] = Sight::kUnknown;
       ++out.unknown;
       continue;
     }
     const float margin = std::max(static_cast<float>(config.margin_m),
-                                  3.0f * static_cast<float>(noise.sigma(at.depth_m)));
+                                  3.0f * static_cast<float>(noise.sigma(at.depth_m)) +
+                                      static_cast<float>(config.pose_tolerance_m));
     const float difference = cloud.depth_m[pixel] - at.depth_m;
     Sight sight = Sight::kUnknown;
     if (!is_measurement(cloud.kind[pixel])) {
@@ -121,6 +124,7 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
     } else if (field.nearest(at.col, at.row, pose_px / at.depth_m) > at.depth_m + margin) {
       sight = Sight::kSeenThrough;
     }
+    if (turned_away && sight != Sight::kSeenThrough) continue;
     out.sights[k] = sight;
     switch (sight) {
       case Sight::kHit:
@@ -135,7 +139,8 @@ void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
         break;
       case Sight::kOccluded:
         ++out.occluded;
-        touch(out.touches, observations.observation_of[pixel], false);
+        if (difference > -static_cast<float>(config.cover_m))
+          touch(out.touches, observations.observation_of[pixel], false);
         break;
       case Sight::kUnknown:
         ++out.unknown;

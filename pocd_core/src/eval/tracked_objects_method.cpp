@@ -145,7 +145,7 @@ class TrackedObjectsMethod final : public MappingMethod {
   }
 
   void fuse(Track& track, const Observation& observation) {
-    track.model.fuse(observation.points);
+    track.model.fuse(observation.points, ++looks_);
     track.missed = 0;
     Points points;
     for (const Surfel& surfel : track.model.surfels()) points.push_back(surfel.point_W);
@@ -158,6 +158,7 @@ class TrackedObjectsMethod final : public MappingMethod {
   NaiveTsdf background_;
   std::vector<Track> tracks_;
   std::uint32_t next_id_ = 1;
+  StampNs looks_ = 0;  ///< what the models count looks by
 };
 
 }  // namespace

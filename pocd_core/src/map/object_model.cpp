@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pocd/common/check.hpp"
+
 namespace pocd {
 namespace {
 
@@ -65,7 +67,7 @@ double ObjectModel::explained_share(const std::vector<SurfacePoint>& points, flo
   return static_cast<double>(found) / looked;
 }
 
-int ObjectModel::fuse(const std::vector<SurfacePoint>& points) {
+int ObjectModel::fuse(const std::vector<SurfacePoint>& points, StampNs stamp_ns) {
   // Cap: an old surfel still follows a new measurement of the same noise by a thirtieth per frame.
   constexpr float kMaxFrames = 30.0f;
   int added = 0;
@@ -76,7 +78,7 @@ int ObjectModel::fuse(const std::vector<SurfacePoint>& points) {
       const auto [it, fresh] =
           index_.try_emplace(cell_of(p.point_W), static_cast<std::int32_t>(surfels_.size()));
       if (!fresh) continue;
-      surfels_.push_back({p.point_W, p.normal_W, w, 1, 0});
+      surfels_.push_back({p.point_W, p.normal_W, w, 1, 0, p.arrived, stamp_ns});
       ++added;
       continue;
     }
@@ -97,7 +99,10 @@ int ObjectModel::fuse(const std::vector<SurfacePoint>& points) {
     }
     // A noisy look takes nothing away that precise ones gave.
     s.weight = std::max(s.weight, std::min(s.weight + w, kMaxFrames * w));
-    s.hits = static_cast<std::uint16_t>(std::min<int>(s.hits + 1, 60000));
+    if (s.last_hit_ns != stamp_ns) {
+      s.hits = static_cast<std::uint16_t>(std::min<int>(s.hits + 1, 60000));
+    }
+    s.last_hit_ns = stamp_ns;
     s.seen_through = 0;
   }
   return added;
@@ -112,8 +117,10 @@ void ObjectModel::refile(std::int32_t i, std::uint64_t old_cell) {
   index_.erase(old_cell);
 }
 
-void ObjectModel::absorb(const ObjectModel& other) {
-  for (const Surfel& s : other.surfels_) {
+void ObjectModel::absorb(const ObjectModel& other) { add(other.surfels_); }
+
+void ObjectModel::add(const std::vector<Surfel>& surfels) {
+  for (const Surfel& s : surfels) {
     if (nearest(s.point_W, static_cast<float>(0.75 * spacing_m_)) != kNone) continue;
     if (index_.try_emplace(cell_of(s.point_W), static_cast<std::int32_t>(surfels_.size())).second) {
       surfels_.push_back(s);
@@ -121,15 +128,21 @@ void ObjectModel::absorb(const ObjectModel& other) {
   }
 }
 
-int ObjectModel::erode(int frames) {
-  const auto gone = std::remove_if(surfels_.begin(), surfels_.end(),
-                                   [&](const Surfel& s) { return s.seen_through >= frames; });
-  const int count = static_cast<int>(surfels_.end() - gone);
-  if (count > 0) {
-    surfels_.erase(gone, surfels_.end());
-    rebuild_index();
+std::vector<Surfel> ObjectModel::extract(const std::vector<std::uint8_t>& marked) {
+  POCD_CHECK(marked.size() == surfels_.size());
+  std::vector<Surfel> out;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < surfels_.size(); ++i) {
+    if (marked[i]) {
+      out.push_back(surfels_[i]);
+    } else {
+      surfels_[kept++] = surfels_[i];
+    }
   }
-  return count;
+  if (out.empty()) return out;
+  surfels_.resize(kept);
+  rebuild_index();
+  return out;
 }
 
 void ObjectModel::transform(const Pose& T_new_old) {

@@ -44,6 +44,7 @@ void TsdfIntegrator::prepare(const TsdfConfig& config, const IntegrationInput& i
   k.clear_depth = config.clear_beyond_limit ? k.max_depth : 0.0f;
   k.truncation = static_cast<float>(config.truncation_m());
   k.owner_band = kOwnerBandVoxels * static_cast<float>(config.voxel_size_m);
+  k.voxel = static_cast<float>(config.voxel_size_m);
   k.max_weight = static_cast<float>(config.max_weight);
   const Eigen::Matrix3d R_C_W = frame.T_W_C.linear().transpose();
   int i = 0;

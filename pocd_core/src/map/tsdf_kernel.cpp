@@ -85,10 +85,11 @@ POCD_KERNEL bool holds_surface(const std::int16_t* __restrict tsdf,
 // Running weighted average of the voxels in front of the surface and in the band behind it. `state`
 // says what became of each voxel. Returns whether some voxel was left to carve() because its stored
 // surface is contradicted.
-POCD_KERNEL bool average(float truncation, float max_weight, float free_weight,
+POCD_KERNEL bool average(float truncation, float voxel, float max_weight, float free_weight,
                          const float* __restrict distance, std::int16_t* __restrict tsdf,
                          std::uint16_t* __restrict weight, std::int32_t* __restrict state) {
   const float scale = kTsdfScale / truncation;
+  const float conflict = kConflictVoxels * voxel * scale, behind = -kBehindVoxels * voxel;
   std::int32_t all = 0;
   for (int i = 0; i < kVoxels; ++i) {
     const float s = distance[i];
@@ -96,17 +97,24 @@ POCD_KERNEL bool average(float truncation, float max_weight, float free_weight,
     const std::int32_t w_old = weight[i];
     const std::int32_t contradicts =
         (s >= truncation ? kContradicted : 0) & (w_old > 0 ? -1 : 0) & (t_old < kFreeTsdf ? -1 : 0);
-    const std::int32_t apply = (s >= -truncation ? -1 : 0) & (contradicts ? 0 : -1);
-    const float w = static_cast<float>(w_old);
+    const std::int32_t stays_free = (s < behind ? 1 : 0) & (t_old >= kFreeTsdf ? 1 : 0) &
+                                    (w_old >= kKnownFreeWeight ? 1 : 0);
+    const std::int32_t apply =
+        (s >= -truncation ? -1 : 0) & ((contradicts | stays_free) ? 0 : -1);
     const float t = static_cast<float>(t_old);
     const float target = (s < truncation ? s : truncation) * scale;
+    // What was inside lies well in front of a surface now, or the reverse.
+    const float change = target - t > 0.0f ? target - t : t - target;
+    const std::int32_t opposed = (target < 0.0f ? 1 : 0) ^ (t < 0.0f ? 1 : 0);
+    const std::int32_t halve = opposed & (change >= conflict ? 1 : 0) & (s >= behind ? 1 : 0);
+    const float w = static_cast<float>(w_old) * (halve ? 0.5f : 1.0f);
     const float mean = (t * w + target) / (w + 1.0f);
     // Round to nearest: truncation of a positive number is its floor.
     const std::int32_t t_new = static_cast<std::int32_t>((apply ? mean : t) + 32768.5f) - 32768;
     const std::int32_t is_free = t_new >= kFreeTsdf ? -1 : 0;
     const float cap = is_free ? free_weight : max_weight;
     const float grown = w + 1.0f < cap ? w + 1.0f : cap;
-    const std::int32_t w_new = static_cast<std::int32_t>(apply ? grown : w);
+    const std::int32_t w_new = apply ? static_cast<std::int32_t>(grown) : w_old;
     tsdf[i] = static_cast<std::int16_t>(t_new);
     weight[i] = static_cast<std::uint16_t>(w_new);
     const std::int32_t changed = (t_new ^ t_old) | (w_new ^ w_old);
@@ -239,7 +247,7 @@ BlockOutcome integrate_block(const KernelFrame& frame, float x, float y, float z
   }
   fetch(block.owner.data(), sizeof block.owner);
   const float free_weight = std::min(frame.max_weight, static_cast<float>(kFreeWeight));
-  const bool contradicted = average(frame.truncation, frame.max_weight, free_weight, distance,
+  const bool contradicted = average(frame.truncation, frame.voxel, frame.max_weight, free_weight, distance,
                                     block.tsdf.data(), block.weight.data(), state);
   outcome.changed = (state[kVoxels] & kChanged) != 0;
   outcome.has_surface = (state[kVoxels] & kSurface) != 0;

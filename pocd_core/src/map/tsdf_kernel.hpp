@@ -19,6 +19,16 @@ constexpr int kFreeWeight = 8;
 /// A voxel this near the measured surface takes the pixel's owner [voxels]: a cell that the surface
 /// crosses has all corners within sqrt(3) voxels of it.
 constexpr float kOwnerBandVoxels = 1.75f;
+/// A voxel that changes sides by at least so much loses half of its weight before it is averaged: a
+/// surface that shifted, and the band that a silhouette left behind it, follow within a few frames.
+/// Beyond so far behind a surface nothing is known: it may be thin [voxels].
+constexpr float kConflictVoxels = 2.0f;
+constexpr float kBehindVoxels = 1.25f;
+/// So many looks make free space known: what lies farther behind a surface stays free then.
+constexpr int kKnownFreeWeight = 3;
+/// A zero crossing between voxels that differ by more is no surface: it lies between the band behind
+/// a silhouette and free space that was seen from elsewhere [voxels].
+constexpr float kTornVoxels = 4.0f;
 /// Free space is not believed where a pixel this near saw something closer: poses are not exact,
 /// and thin things would lose voxels at their outline [pixels].
 constexpr int kEdgeGuard_px = 2;
@@ -33,7 +43,7 @@ struct KernelFrame {
   int owner_stride = 0;  // elements per row; 0 with a single entry for "no owners given"
   float owner_max_u = 0, owner_max_v = 0;
   float owner_scale = 0;  // 1 / pixels per owner entry
-  float max_depth = 0, clear_depth = 0, truncation = 0, owner_band = 0;
+  float max_depth = 0, clear_depth = 0, truncation = 0, owner_band = 0, voxel = 0;
   float max_weight = 0;
   // Voxel centres of a block relative to its first corner, in the camera frame [m].
   alignas(64) float offset_x[VoxelBlock::kVoxels];

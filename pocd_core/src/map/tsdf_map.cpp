@@ -55,22 +55,38 @@ void TsdfMap::check_view(const Frame& frame) const {
 }
 
 std::size_t TsdfMap::clear_object(ObjectId id) {
-  impl_->settle_touched();
+  return clear_object_where(id, [](const Eigen::Vector3d&) { return true; });
+}
+
+std::size_t TsdfMap::clear_object_where(
+    ObjectId id, const std::function<bool(const Eigen::Vector3d&)>& inside) {
   const std::uint32_t owner = to_index(id);
+  if (owner == 0) return 0;
+  impl_->settle_touched();
+  const double voxel_m = impl_->config.voxel_size_m;
   std::size_t cleared = 0;
   for (const std::uint32_t slot : impl_->store.take_owner(owner)) {
     VoxelBlock& block = impl_->store.block(slot);
     std::size_t here = 0;
-    bool surface = false;
+    bool surface = false, kept = false;
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
       if (block.owner[i] == owner) {
-        block.tsdf[i] = 0;
-        block.weight[i] = 0;
-        block.owner[i] = 0;
-        ++here;
+        const Eigen::Vector3d center_W =
+            (8.0 * Eigen::Vector3d(block.key.x, block.key.y, block.key.z) +
+             Eigen::Vector3d((i & 7) + 0.5, (i >> 3 & 7) + 0.5, (i >> 6) + 0.5)) *
+            voxel_m;
+        if (inside(center_W)) {
+          block.tsdf[i] = 0;
+          block.weight[i] = 0;
+          block.owner[i] = 0;
+          ++here;
+        } else {
+          kept = true;
+        }
       }
       surface |= block.weight[i] > 0 && block.tsdf[i] < kFreeTsdf;
     }
+    if (kept) impl_->store.note_owner(slot, owner);
     if (here == 0) continue;
     cleared += here;
     impl_->store.mark_dirty(slot);
@@ -105,6 +121,23 @@ const VoxelBlock* TsdfMap::find(const BlockKey& key) const {
   if (slot != BlockStore::kNoSlot) return &impl_->store.block(slot);
   POCD_CHECK(!impl_->store.contains(key));
   return nullptr;
+}
+
+std::optional<double> TsdfMap::distance_at(const Eigen::Vector3f& point_W, int min_weight) {
+  const TsdfConfig& config = impl_->config;
+  const Eigen::Array3i voxel =
+      (point_W.array() / static_cast<float>(config.voxel_size_m)).floor().cast<int>();
+  const BlockKey key{voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3};
+  std::uint32_t slot = impl_->store.find(key);
+  if (slot == BlockStore::kNoSlot && impl_->store.contains(key)) {
+    impl_->store.enter(*impl_->store.region(key.region()));
+    slot = impl_->store.find(key);
+  }
+  if (slot == BlockStore::kNoSlot) return std::nullopt;
+  const int i = (voxel.x() & 7) + 8 * ((voxel.y() & 7) + 8 * (voxel.z() & 7));
+  const VoxelBlock& block = impl_->store.block(slot);
+  if (block.weight[i] < min_weight) return std::nullopt;
+  return block.tsdf[i] / static_cast<double>(kTsdfScale) * config.truncation_m();
 }
 
 VoxelBlock& TsdfMap::touch(const BlockKey& key) {

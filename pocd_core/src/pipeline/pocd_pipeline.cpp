@@ -8,7 +8,7 @@
 #include <string>
 
 #include "frame_clock.hpp"
-#include "object_tracker.hpp"
+#include "../track/object_tracker.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {
@@ -74,8 +74,7 @@ struct PocdPipeline::Impl {
   PlaneSegmentation planes;
   Observations observations;
   DepthField field;
-  std::vector<std::uint32_t> owner_of_observation;
-  std::vector<std::uint32_t> owners;
+  std::vector<std::uint32_t> owner_of_pixel;  ///< of observations
   bool mask_missing = false;
 
   /// Whether a robot that delivers masks did not this time.
@@ -86,7 +85,7 @@ struct PocdPipeline::Impl {
 
   /// Before anything changes: a frame that is refused later would leave half of its traces.
   void check(const Frame& frame) const;
-  void paint_owners();
+  void skip_what_moves();
   void integrate(const Frame& frame);
 };
 
@@ -144,7 +143,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   }
   clock.done("cluster");
   p.field.update(p.cloud);
-  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_observation,
+  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_pixel,
                    result);
   clock.done("objects");
   p.integrate(placed);
@@ -166,27 +165,23 @@ void PocdPipeline::Impl::check(const Frame& frame) const {
   map.check_view(frame);
 }
 
-void PocdPipeline::Impl::paint_owners() {
-  owners.resize(cloud.size());
+void PocdPipeline::Impl::skip_what_moves() {
   constexpr std::size_t kGrain = 8192;
   pool.parallel_for(cloud.size(), kGrain, [this](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const std::int32_t observation = observations.observation_of[i];
       if (mask_missing || cloud.kind[i] == PixelKind::kDynamic ||
           cloud.kind[i] == PixelKind::kIgnore) {
-        owners[i] = IntegrationInput::kSkip;
-      } else {
-        owners[i] = observation == Observations::kNone ? 0 : owner_of_observation[observation];
+        owner_of_pixel[i] = IntegrationInput::kSkip;
       }
     }
   });
 }
 
 void PocdPipeline::Impl::integrate(const Frame& frame) {
-  paint_owners();
+  skip_what_moves();
   IntegrationInput input;
   input.frame = &frame;
-  input.owners = owners.data();
+  input.owners = owner_of_pixel.data();
   input.owner_width = cloud.width;
   input.owner_height = cloud.height;
   input.owner_stride = cloud.stride;

@@ -57,7 +57,9 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
         if (large.instance != small.instance) continue;
         const bool same = large.class_id == small.class_id;
         if (!same && small.pixels * 4 > large.pixels) continue;
-        if (box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass))
+        // What has one instance number is one thing, whatever stands before it.
+        const bool one_thing = same && large.instance != 0;
+        if (!one_thing && box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass))
           continue;
         large.members.insert(large.members.end(), small.members.begin(), small.members.end());
         large.pixels += small.pixels;
@@ -148,7 +150,10 @@ void thin(const OrganizedCloud& cloud, const PlaneSegmentation& planes, const De
   points.reserve(sums.size());
   for (const Memory::CellSum& sum : sums) {
     const float count = static_cast<float>(sum.count);
-    SurfacePoint point{sum.point / count, Eigen::Vector3f::Zero(), sum.sigma / count};
+    SurfacePoint point;
+    point.point_W = sum.point / count;
+    point.normal_W = Eigen::Vector3f::Zero();
+    point.sigma_m = sum.sigma / count;
     const float norm = sum.normal.norm();
     // Several planes in one cell (an edge) leave a short sum: no single normal there.
     if (norm > 0.7f * count) point.normal_W = sum.normal / norm;
@@ -240,6 +245,7 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
   for (Cluster& cluster : clusters) {
     Observation observation;
     observation.class_id = cluster.class_id;
+    observation.instance = cluster.instance;
     observation.pixels = cluster.pixels;
     observation.area_m2 = cluster.area_m2;
     thin(cloud, planes, noise, spacing_m, cluster, memory, observation.points);

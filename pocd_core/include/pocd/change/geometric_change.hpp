@@ -1,23 +1,15 @@
-// Step 5 of the method: by how much a matched object seems to have moved.
+// Step 5 of the method: how far the surface of an object in its place lies from where it was.
 #pragma once
 
-#include "pocd/association/associate.hpp"
+#include "pocd/association/visibility.hpp"
 #include "pocd/change/change_config.hpp"
 
 namespace pocd {
 
-/// Signed change Delta in [-delta_max, delta_max] [m]; positive when the surface came nearer.
-///
-/// measure "projective": for an object in place, the median of expected minus measured depth over
-/// its visible points within tau, or over all where none is: one half of the points would have to
-/// move before it does, while a mean follows every hole and border. For an object aligned
-/// elsewhere, its displacement.
-///
-/// measure "ray_traced": the mean difference of two TSDFs (ray_traced_change), for an object in
-/// place with the sign of the mean signed difference; the displacement where the two have no voxel
-/// in common.
-double geometric_change(const LibraryObject& object, const Observation& observation,
-                        const Sighting& sighting, const Match& match, const OrganizedCloud& cloud,
-                        const ChangeConfig& config);
+/// Minus the median of measured - expected depth [m] over the points that were measured in place:
+/// positive when the surface is nearer to the camera than it was. 0 when no point was measured. Each
+/// point is compared with the nearest depth among the 3 x 3 pixels around it, which takes the
+/// sideways error of the pose out and pulls small changes towards 0.
+double geometric_change(const Sighting& sighting, const ChangeConfig& config);
 
 }  // namespace pocd

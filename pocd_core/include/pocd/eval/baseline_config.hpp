@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pocd/config/describe.hpp"
+#include "pocd/eval/published_config.hpp"
 
 namespace pocd {
 
@@ -94,6 +95,7 @@ struct SubmapsConfig : VoxelWeights {
 };
 
 struct BaselineConfig {
+  PublishedConfig published;
   StaticTsdfConfig static_tsdf;
   VoxelCorrectionConfig voxel_correction;
   TrackedObjectsConfig tracked_objects;
@@ -101,6 +103,7 @@ struct BaselineConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
+    visit.group("published", published, "The method as its authors published it.");
     visit.group("static_tsdf", static_tsdf, "Static world.");
     visit.group("voxel_correction", voxel_correction, "Correction voxel by voxel.");
     visit.group("tracked_objects", tracked_objects, "Tracked dynamic objects.");

@@ -27,48 +27,53 @@ struct Moment {
   int points = 0;                   ///< of the object, that the view in the belief told of
 };
 
+/// Whether a thing came to its place while the system knew of the place.
+enum class Arrival : std::uint8_t {
+  kUnknown,  ///< part of its place was seen empty before, part of it was never seen
+  kFound,    ///< its place was never seen empty: it may always have stood there
+  kArrived,  ///< its place was seen empty before
+};
+const char* to_string(Arrival arrival);  ///< "unknown", "found", "arrived"
+
+/// What the system knows of one thing: the paper's fields, and where it is in its life.
 struct LibraryObject {
   LibraryObject(ObjectId object_id, double spacing_m) : id(object_id), model(spacing_m) {}
 
+  // The thing.
   ObjectId id;
   ClassId class_id = 0;
   int stationarity_class = 0;
-  bool confirmed = false;  ///< false: tentative, known to nobody outside
   ObjectModel model;
   OrientedBox box;
   Eigen::Vector3d centroid_W = Eigen::Vector3d::Zero();  ///< mean of the surface
   Belief belief;
+  Arrival arrival = Arrival::kUnknown;
+  bool moved = false;  ///< it moved as a whole: what it touches is not of it
+
+  // Who saw it, when.
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;
-  StampNs verified_ns = 0;         ///< when it was seen in its place with nothing against it
-  StampNs contested_ns = 0;        ///< when its place was seen empty or covered in good part
-  StampNs contested_since_ns = 0;  ///< the first such frame after it was verified
-  std::optional<bool> arrived;     ///< whether its place was seen empty before; when asked
+  StampNs in_place_ns = 0;  ///< the last look that found it in its place
   std::string last_robot;
   std::set<std::string> seen_by;  ///< robots that have observed it
   Moment moment;                  ///< the last one
   std::uint32_t observations = 0;
-  int frames_in_view = 0;           ///< tentative only: without being fused
-  int frames_seen_through = 0;      ///< in a row
-  int frames_displaced = 0;         ///< in a row
-  int frames_odd = 0;               ///< in a row, much of it beside its surface, aligned in place
-  OrientedBox reported_box;         ///< as in the last event
-  OrientedBox expected_box;         ///< of one that moved: where all of it must be; else of size 0
-  std::optional<StampNs> grew_ns;   ///< when it was seen to grow into what was empty before
-  OrientedBox box_before_growth;    ///< as reported before that
-  bool growing = false;             ///< the last observation added a notable share of its points
-  bool cut = false;                 ///< the last observation went on out of sight
-  bool cut_above = false;           ///< the same, above it
-  std::size_t gained = 0;           ///< points since the last event
-  std::size_t eroded = 0;           ///< points since the last event
-  std::size_t returned = 0;         ///< points since the last event, in the box of that event
-  std::optional<StampNs> added_ns;  ///< when reported as new; unset for what was known before
-  ObjectId moved_from = ObjectId::kNone;  ///< tentative: the object that it may be, elsewhere
-  bool changed = false;                   ///< since the last FrameResult
-  std::size_t box_surfels = 0;            ///< size of the model when the box was fitted
+
+  // Where it is in its life.
+  bool confirmed = false;              ///< false: tentative, known to nobody outside
+  std::optional<StampNs> added_ns;     ///< when it was reported as ADDED; unset once it was moved
+  OrientedBox reported_box;            ///< as in the last event
+  bool changed = false;                ///< since the last FrameResult
+  int looks_missed = 0;                ///< tentative only: in view without being fused
+  int looks_unobserved = 0;            ///< in a row: its place was seen empty
+  StampNs unobserved_since_ns = 0;     ///< the first of them
+  int looks_displaced = 0;             ///< in a row: aligned beside its place
+  int looks_losing = 0;                ///< in a row: a part of it is seen through
+  std::size_t lost = 0;                ///< points eroded since the last event
+  std::map<ObjectId, int> companions;  ///< objects seen in one piece with it: in how many looks
+
+  std::size_t box_surfels = 0;  ///< size of the model when the box was fitted
   std::size_t most_surfels = 0;
-  /// Objects that share an observation with this one, and for how many frames.
-  std::map<ObjectId, int> companions;
   /// Alignment target made of the model; dropped when the model changes.
   std::shared_ptr<const IcpTarget> icp_target;
 };
@@ -78,6 +83,8 @@ struct LibraryObject {
 class ObjectLibrary {
  public:
   LibraryObject& create(double spacing_m);
+  /// An id that no object has or gets: for a part that leaves an object.
+  ObjectId reserve_id() { return ObjectId{next_id_++}; }
   LibraryObject* find(ObjectId id);
   const LibraryObject* find(ObjectId id) const;
   void erase(ObjectId id);

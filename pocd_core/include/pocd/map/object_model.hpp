@@ -14,7 +14,9 @@ struct Surfel {
   Eigen::Vector3f normal_W;       ///< unit, or zero where unknown
   float weight = 0.0f;            ///< sum of inverse variances [1/m2], capped
   std::uint16_t hits = 0;         ///< frames that measured it
-  std::uint8_t seen_through = 0;  ///< frames in a row that saw through it
+  std::uint8_t seen_through = 0;  ///< looks in a row that saw through it
+  bool arrived = false;           ///< its place was seen empty before it was first measured
+  StampNs last_hit_ns = 0;        ///< of the last frame that measured it
 };
 
 /// Not thread-safe. Order of surfels is the order of their creation.
@@ -33,15 +35,18 @@ class ObjectModel {
   /// Share of the points with a surfel within `radius_m`; looks at no more than `budget` of them.
   double explained_share(const std::vector<SurfacePoint>& points, float radius_m, int budget) const;
 
-  /// Fuses measured points: a surfel near one moves along its normal by inverse variance; else a
-  /// new one is made. Returns how many are new.
-  int fuse(const std::vector<SurfacePoint>& points);
+  /// Fuses the measured points of one frame: a surfel near one moves along its normal by inverse
+  /// variance; else a new one is made. Returns how many are new.
+  int fuse(const std::vector<SurfacePoint>& points, StampNs stamp_ns);
 
   /// Adds the surfels of another model where this one has none.
   void absorb(const ObjectModel& other);
 
-  /// Drops surfels that were seen through in at least `frames` frames in a row; returns how many.
-  int erode(int frames);
+  /// Takes out the surfels that are marked (one entry per surfel, non-zero: out) and returns them.
+  std::vector<Surfel> extract(const std::vector<std::uint8_t>& marked);
+
+  /// Adds surfels as they are, where this model has none.
+  void add(const std::vector<Surfel>& surfels);
 
   /// Applies a rigid motion to all surfels.
   void transform(const Pose& T_new_old);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -87,6 +88,11 @@ class TsdfMap {
   /// empty, returns how many voxels were reset. Cost grows with the object, not with the map.
   std::size_t clear_object(ObjectId id);
 
+  /// The same for those of its voxels whose centre [m, W] `inside` accepts; the object keeps the
+  /// others.
+  std::size_t clear_object_where(ObjectId id,
+                                 const std::function<bool(const Eigen::Vector3d&)>& inside);
+
   /// Voxels of `from` become voxels of `to` (two library entries found to be one thing).
   std::size_t reassign_object(ObjectId from, ObjectId to);
 
@@ -94,6 +100,10 @@ class TsdfMap {
   /// Null where nothing is allocated. Valid until the next change of the map. The block must be in
   /// memory, as all are without a budget: MapReader finds those on disk.
   const VoxelBlock* find(const BlockKey& key) const;
+  /// Signed distance [m] of the voxel that holds the point, positive in front of a surface; nothing
+  /// where fewer than `min_weight` looks measured it. Brings its region back to memory: what is on
+  /// disk must not change what follows.
+  std::optional<double> distance_at(const Eigen::Vector3f& point_W, int min_weight);
   /// For tests and loading: the block at key, allocated when missing; marked dirty.
   VoxelBlock& touch(const BlockKey& key);
   /// Keys of all blocks in canonical order (BlockKey::operator<).

@@ -14,11 +14,13 @@ struct SurfacePoint {
   Eigen::Vector3f point_W;
   Eigen::Vector3f normal_W;
   float sigma_m = 0.0f;
+  bool arrived = false;  ///< its place was seen empty before; set where that is asked
 };
 
 /// One cluster of one frame, thinned to about one point per `spacing`.
 struct Observation {
   ClassId class_id = 0;
+  std::uint16_t instance = 0;  ///< 0 where masks carry no instances
   OrientedBox box;
   std::vector<SurfacePoint> points;
   int pixels = 0;        ///< of the strided grid

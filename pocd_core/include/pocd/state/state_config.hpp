@@ -21,9 +21,7 @@ struct StateConfig {
   int merge_frames = 10;
   double moment_s = 0.1;
   double relocation_window_s = 60.0;
-  double relocation_reach_m = 2.5;
-  double least_depth_m = 0.4;
-  bool explain_new = true;
+  double relocation_reach_m = 1.5;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -66,14 +64,6 @@ struct StateConfig {
           "[s].");
     visit("relocation_reach_m", relocation_reach_m, Range{0.0, 1e6},
           "A new object that is seen only in part is the removed one within this distance [m].");
-    visit("explain_new", explain_new,
-          "Ask whether a new object is a part of a known one, or stands in its place so that it "
-          "moved "
-          "or was replaced.");
-    visit(
-        "least_depth_m", least_depth_m, Range{0.0, 100.0},
-        "How deep things of the place are at least, where only their near side was seen: a new one "
-        "that would overlap a like known one took its place [m].");
   }
 };
 

@@ -1,0 +1,45 @@
+// Where nothing was seen to be: what stands in such a place later has arrived.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+
+#include "pocd/association/visibility.hpp"
+#include "pocd/map/voxel_block.hpp"
+
+namespace pocd {
+
+/// A grid of cells over the space that cameras have looked at. Each cell counts the looks that saw
+/// all of it empty since something was last measured in it. Memory follows the space that was
+/// looked at (512 bytes per block of 8 x 8 x 8 cells), not time. Not thread-safe.
+class FreeSpace {
+ public:
+  /// `cell_m`: edge of a cell [m], > 0.
+  explicit FreeSpace(double cell_m);
+
+  /// Takes in one frame up to `max_depth_m`. A cell counts as seen empty when every return around
+  /// its projection lies behind all of it by more than three sigma of the depth noise and
+  /// `pose_tolerance_m`; a cell in which a return lies starts anew. Pixels without a return and
+  /// pixels of moving things say nothing.
+  void update(const OrganizedCloud& cloud, const DepthField& field, const DepthNoise& noise,
+              double max_depth_m, double pose_tolerance_m);
+
+  /// Whether at least `kLooks` looks saw the cell of the point empty, and nothing was measured
+  /// there since.
+  bool seen_empty(const Eigen::Vector3f& point_W) const;
+  static constexpr int kLooks = 3;
+
+  std::size_t block_count() const { return blocks_.size(); }
+
+ private:
+  static constexpr int kSide = 8;
+  static constexpr int kCells = kSide * kSide * kSide;
+  using Block = std::array<std::uint8_t, kCells>;
+
+  double cell_m_;
+  std::unordered_map<BlockKey, std::unique_ptr<Block>, BlockKeyHash> blocks_;  ///< looked up only
+};
+
+}  // namespace pocd

@@ -1,0 +1,111 @@
+#include "pocd/observe/free_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pocd/common/check.hpp"
+
+namespace pocd {
+namespace {
+
+constexpr float kMinDepth = 0.1f;
+
+int floor_div(double v, double size) { return static_cast<int>(std::floor(v / size)); }
+
+}  // namespace
+
+FreeSpace::FreeSpace(double cell_m) : cell_m_(cell_m) { POCD_CHECK(cell_m > 0.0); }
+
+bool FreeSpace::seen_empty(const Eigen::Vector3f& point_W) const {
+  const int x = floor_div(point_W.x(), cell_m_), y = floor_div(point_W.y(), cell_m_),
+            z = floor_div(point_W.z(), cell_m_);
+  const auto it = blocks_.find({x >> 3, y >> 3, z >> 3});
+  return it != blocks_.end() && (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] >= kLooks;
+}
+
+void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
+                       const DepthNoise& noise, double max_depth_m, double pose_tolerance_m) {
+  const CameraModel& camera = cloud.camera;
+  const double block_m = cell_m_ * kSide;
+  const Pose T_C_W = cloud.T_W_C.inverse();
+  const Eigen::Matrix3f R = T_C_W.linear().cast<float>();
+  std::array<Eigen::Vector3f, kCells> offset;  // of the cells' centres from the block's corner [C]
+  for (int i = 0; i < kCells; ++i) {
+    offset[i] = R *
+                (Eigen::Vector3f(static_cast<float>(i & 7), static_cast<float>(i >> 3 & 7),
+                                 static_cast<float>(i >> 6))
+                     .array() +
+                 0.5f)
+                    .matrix() *
+                static_cast<float>(cell_m_);
+  }
+  // Corners of the view, in the world.
+  Eigen::Vector3d low = cloud.T_W_C.translation(), high = low;
+  for (const double u : {0.0, static_cast<double>(cloud.width)}) {
+    for (const double v : {0.0, static_cast<double>(cloud.height)}) {
+      const Eigen::Vector3d corner =
+          cloud.T_W_C * Eigen::Vector3d((u - camera.cx) / camera.fx * max_depth_m,
+                                        (v - camera.cy) / camera.fy * max_depth_m, max_depth_m);
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
+    }
+  }
+  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  const auto cx = static_cast<float>(camera.cx) + 0.5f, cy = static_cast<float>(camera.cy) + 0.5f;
+  const auto limit = static_cast<float>(max_depth_m);
+  const float half_diagonal = static_cast<float>(0.5 * std::sqrt(3.0) * cell_m_);
+  const float radius_px = static_cast<float>(0.5 * cell_m_ + pose_tolerance_m) * fx;
+  const float ball = static_cast<float>(0.5 * std::sqrt(3.0) * block_m);
+  const float slope_x = static_cast<float>(std::max(camera.cx, cloud.width - camera.cx)) / fx;
+  const float slope_y = static_cast<float>(std::max(camera.cy, cloud.height - camera.cy)) / fy;
+  const float wide_x = ball * std::sqrt(1.0f + slope_x * slope_x);
+  const float wide_y = ball * std::sqrt(1.0f + slope_y * slope_y);
+
+  for (int bz = floor_div(low.z(), block_m); bz <= floor_div(high.z(), block_m); ++bz) {
+    for (int by = floor_div(low.y(), block_m); by <= floor_div(high.y(), block_m); ++by) {
+      for (int bx = floor_div(low.x(), block_m); bx <= floor_div(high.x(), block_m); ++bx) {
+        const Eigen::Vector3f corner_C =
+            (T_C_W * (Eigen::Vector3d(bx, by, bz) * block_m)).cast<float>();
+        const Eigen::Vector3f center_C =
+            corner_C + R * Eigen::Vector3f::Constant(static_cast<float>(0.5 * block_m));
+        if (center_C.z() < -ball || center_C.z() > limit + ball ||
+            std::abs(center_C.x()) > slope_x * center_C.z() + wide_x ||
+            std::abs(center_C.y()) > slope_y * center_C.z() + wide_y) {
+          continue;
+        }
+        const auto it = blocks_.find({bx, by, bz});
+        Block* block = it == blocks_.end() ? nullptr : it->second.get();
+        for (int i = 0; i < kCells; ++i) {
+          const Eigen::Vector3f p = corner_C + offset[i];
+          if (p.z() < kMinDepth || p.z() > limit) continue;
+          const float u = fx * p.x() / p.z() + cx, v = fy * p.y() / p.z() + cy;
+          if (u < 0.0f || v < 0.0f) continue;
+          const int col = static_cast<int>(u), row = static_cast<int>(v);
+          if (col >= cloud.width || row >= cloud.height) continue;
+          const std::size_t pixel = static_cast<std::size_t>(row) * cloud.width + col;
+          const float depth = cloud.depth_m[pixel];
+          if (depth <= 0.0f || cloud.kind[pixel] == PixelKind::kDynamic ||
+              cloud.kind[pixel] == PixelKind::kIgnore) {
+            continue;
+          }
+          if (std::abs(depth - p.z()) <= half_diagonal) {
+            if (block) (*block)[i] = 0;
+            continue;
+          }
+          const float behind = p.z() + half_diagonal + static_cast<float>(pose_tolerance_m) +
+                               3.0f * static_cast<float>(noise.sigma(p.z()));
+          if (depth <= behind || field.nearest(col, row, radius_px / p.z()) <= behind) continue;
+          if (!block) {
+            auto& made = blocks_[{bx, by, bz}];
+            made = std::make_unique<Block>();
+            made->fill(0);
+            block = made.get();
+          }
+          if ((*block)[i] < 255) ++(*block)[i];
+        }
+      }
+    }
+  }
+}
+
+}  // namespace pocd

@@ -1,0 +1,294 @@
+// ObjectTracker: what departed and what arrived, and whether they are one thing.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pocd/association/point_to_plane_icp.hpp"
+#include "tracker_step.hpp"
+
+namespace pocd {
+namespace {
+
+/// The new surface lies on the old one, moved, with at most this share beside it.
+constexpr double kOutlierShare = 0.2;
+/// With the known sides of it so far seen, so much may lie beside them: sides that were not known.
+constexpr double kWholeShare = 0.6;
+constexpr double kUnseenShare = 0.5;
+/// At most this share of the old surface, moved, lies where nothing is.
+constexpr double kEmptyShare = 0.15;
+/// At least this share of the old surface, moved, is seen at the new place.
+constexpr double kSeenShare = 0.2;
+/// A thing in a place that was never seen empty is the departed one only when it is nearer than
+/// this share of its length.
+constexpr double kNearShare = 1.0;
+/// Share of the surface that a motion must explain more when it is longer by the thing's length.
+constexpr double kShortness = 0.5;
+/// Moves farther than that are told after this time: another thing may be nearer [s].
+constexpr double kFarWaitS = 1.0;
+/// Share of its length that a thing may have moved to be told so at once.
+constexpr double kAtOnceShare = 1.0;
+constexpr std::size_t kAlignPoints = 600;
+
+double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
+
+/// The new one is no larger than the old one, and stands as high.
+bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) {
+  const auto sorted = [](const OrientedBox& box) {
+    const double x = box.size_m.x(), y = box.size_m.y();
+    return Eigen::Vector3d(std::max(x, y), std::min(x, y), box.size_m.z());
+  };
+  const Eigen::Vector3d f = sorted(found), k = sorted(known);
+  const auto room = [&](double x) { return x + std::max(slack_m, 0.25 * x); };
+  return f[0] <= room(k[0]) && f[1] <= room(k[0]) && f[2] <= room(k[2]) && k[2] <= room(f[2]);
+}
+
+}  // namespace
+
+std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
+                                               const LibraryObject& found, StampNs now_ns) const {
+  if (departure.class_id != found.class_id || departure.id == found.id) return std::nullopt;
+  // What was seen in its place when the new one was there, too, is another thing.
+  if (departure.in_place_ns > found.first_seen_ns) return std::nullopt;
+  const double slack_m = 3.0 * config_.map.voxel_size_m;
+  const double distance_m =
+      (departure.box.pose.position_W - found.box.pose.position_W).head<2>().norm();
+  // Of each only a part may be known: how far it went is told by the alignment.
+  const double parts_m =
+      0.5 * (departure.box.size_m.head<2>().norm() + found.box.size_m.head<2>().norm());
+  if (distance_m > config_.state.relocation_reach_m + parts_m) return std::nullopt;
+  if (!may_be(found.box, departure.box, slack_m)) return std::nullopt;
+
+  Points points, normals, source;
+  for (const Surfel& s : departure.surfels) {
+    points.push_back(s.point_W);
+    normals.push_back(s.normal_W);
+  }
+  const auto& surfels = found.model.surfels();
+  const std::size_t step = std::max<std::size_t>(1, surfels.size() / kAlignPoints);
+  for (std::size_t i = 0; i < surfels.size(); i += step) source.push_back(surfels[i].point_W);
+  const double inlier_m = 1.5 * config_.map.voxel_size_m;
+  const IcpTarget target(points, normals, inlier_m,
+                         std::max(inlier_m, config_.association.icp_max_distance_m));
+  IcpOptions options;
+  options.max_iterations = config_.association.icp_iterations;
+  options.robust_scale_m = config_.map.voxel_size_m;
+  // As it stands, and with the boxes' sides along each other; by the middles, and, for of each only
+  // a part may be known, by either end.
+  std::vector<Pose> starts{Pose::Identity()};
+  const double turn_rad = departure.box.pose.yaw_rad - found.box.pose.yaw_rad;
+  const auto along_of = [](const OrientedBox& box) {
+    const double yaw = box.pose.yaw_rad + (box.size_m.x() < box.size_m.y() ? M_PI_2 : 0.0);
+    return Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+  };
+  const Eigen::Vector3d along_W = along_of(departure.box);
+  const double play_m = 0.5 * (longest_side(departure.box) - longest_side(found.box));
+  for (int quarter = -1; quarter < 4; ++quarter) {
+    Pose start = Pose::Identity();
+    if (quarter >= 0) {
+      start.linear() = Eigen::AngleAxisd(turn_rad + quarter * M_PI / 2.0, Eigen::Vector3d::UnitZ())
+                           .toRotationMatrix();
+    }
+    for (const double slid_m : {0.0, play_m, -play_m}) {
+      if (slid_m != 0.0 && std::abs(play_m) < inlier_m) continue;
+      start.translation() = departure.box.pose.position_W + slid_m * along_W -
+                            start.linear() * found.box.pose.position_W;
+      starts.push_back(start);
+    }
+  }
+  // What may have come from farther away is told once nearer origins had time to show.
+  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  const bool settled =
+      now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns;
+  std::optional<Motion> best;
+  double best_score = 0.0;
+  bool enough = false;
+  for (const Pose& start : starts) {
+    const IcpResult icp = point_to_plane_icp(target, source, options, start);
+    if (icp.dissimilarity > kUnseenShare) continue;
+    const Pose T_new_old = icp.T_target_source.inverse();
+    double moved_m = 0.0;  // of its points: what turns in place moves, too
+    for (const Surfel& s : departure.surfels) {
+      const Eigen::Vector3d p = s.point_W.cast<double>();
+      moved_m += (T_new_old * p - p).norm();
+    }
+    moved_m /= static_cast<double>(departure.surfels.size());
+    if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
+      continue;
+    const double lengths = moved_m / longest_side(departure.box);
+    if (lengths > kNearShare && found.arrival != Arrival::kArrived) continue;
+    if (lengths > kAtOnceShare && !settled) continue;
+    const Eigen::Isometry3f T = T_new_old.cast<float>();
+    std::size_t empty = 0, seen = 0;
+    for (const Surfel& s : departure.surfels) {
+      const Eigen::Vector3f there = T * s.point_W;
+      if (found.model.nearest(there, static_cast<float>(inlier_m)) != ObjectModel::kNone) {
+        ++seen;
+      } else if (free_space_.seen_empty(there)) {
+        ++empty;
+      }
+    }
+    const auto all = static_cast<double>(departure.surfels.size());
+    if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty)) continue;
+    // New sides may show when all of the known ones do.
+    if (icp.dissimilarity > kOutlierShare && static_cast<double>(seen) < kWholeShare * all)
+      continue;
+    // Of motions that explain the same, the shortest: the sides of a box are alike.
+    const double contradicted = static_cast<double>(empty) / static_cast<double>(seen + empty);
+    const double score =
+        1.0 - icp.dissimilarity - contradicted - kShortness * moved_m / longest_side(departure.box);
+    if (best && score <= best_score) continue;
+    best_score = score;
+    best = Motion{T_new_old, moved_m};
+    enough = static_cast<double>(seen) >= kSeenShare * all;
+  }
+  return enough ? best : std::nullopt;
+}
+
+bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& object) {
+  for (const ObjectId id :
+       library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
+    const LibraryObject* other = library_.find(id);
+    if (other->confirmed && other->class_id == object.class_id && other->looks_unobserved > 0 &&
+        other->in_place_ns <= object.first_seen_ns) {
+      return true;
+    }
+  }
+  (void)step;
+  return false;
+}
+
+LibraryObject* ObjectTracker::find_departed(const Step& step, const Departure& departure,
+                                            Motion& motion) {
+  LibraryObject* best = nullptr;
+  const StampNs now_ns = step.frame.stamp_ns;
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  for (const ObjectId id :
+       library_.near(departure.box.pose.position_W,
+                     config_.state.relocation_reach_m + departure.box.size_m.head<2>().norm())) {
+    LibraryObject* other = library_.find(id);
+    const bool open = other->confirmed ? other->added_ns && now_ns - *other->added_ns <= window_ns
+                                       : other->observations >= 2;
+    if (!open || other->id == departure.part_of) continue;
+    const auto m = motion_of(departure, *other, now_ns);
+    if (!m || (best && m->length_m >= motion.length_m)) continue;
+    best = other, motion = *m;
+  }
+  return best;
+}
+
+void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
+  departure.evidence.rule = rule;
+  Motion motion;
+  if (LibraryObject* found = find_departed(step, departure, motion)) {
+    report_move(step, *found, departure, motion.T_new_old, rule);
+    return;
+  }
+  ObjectEvent event;
+  event.sequence = next_event_++;
+  event.kind = EventKind::kRemoved;
+  event.object = departure.id;
+  event.class_id = departure.class_id;
+  event.stamp_ns = step.frame.stamp_ns;
+  event.frame_sequence = step.frame.sequence;
+  event.robot = step.frame.robot;
+  event.box = departure.box;
+  event.evidence = departure.evidence;
+  step.result.events.push_back(std::move(event));
+  if (departure.part_of == ObjectId::kNone) step.result.retired.push_back(departure.id);
+  departures_.add(std::move(departure));
+}
+
+bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
+  const Departure* best = nullptr;
+  Motion motion;
+  for (const Departure& d :
+       departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
+    const auto m = motion_of(d, object, step.frame.stamp_ns);
+    if (!m || (best && m->length_m >= motion.length_m)) continue;
+    best = &d, motion = *m;
+  }
+  if (!best) return false;
+  const Departure from = *best;
+  report_move(step, object, from, motion.T_new_old, "found_again");
+  return true;
+}
+
+void ObjectTracker::find_far_moves(Step& step) {
+  const StampNs now_ns = step.frame.stamp_ns;
+  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  std::vector<Departure> due;
+  for (const Departure& d : departures_.recent(now_ns, config_.state.relocation_window_s)) {
+    if (!d.asked_far && now_ns - d.departed_ns >= wait_ns) due.push_back(d);
+  }
+  for (const Departure& d : due) {
+    departures_.set_asked_far(d.id);
+    Motion motion;
+    if (LibraryObject* found = find_departed(step, d, motion))
+      report_move(step, *found, d, motion.T_new_old, "found_again");
+  }
+  while (!arrivals_.empty() && now_ns - arrivals_.front().since_ns >= wait_ns) {
+    LibraryObject* object = library_.find(arrivals_.front().object);
+    arrivals_.pop_front();
+    if (object && object->added_ns) find_origin(step, *object);
+  }
+}
+
+void ObjectTracker::confirm(Step& step, LibraryObject& object) {
+  if (find_origin(step, object)) return;
+  object.confirmed = true;
+  object.reported_box = object.box;
+  object.lost = 0;
+  object.added_ns = step.frame.stamp_ns;
+  arrivals_.push_back({object.id, step.frame.stamp_ns});
+  mark_changed(object);
+  add_event(step, EventKind::kAdded, object, to_string(object.arrival));
+}
+
+void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departure& from,
+                                const Pose& T_new_old, const std::string& rule) {
+  const std::optional<ObjectId> absorbed =
+      found.confirmed ? std::make_optional(found.id) : std::nullopt;
+  const ObjectId old = found.id;
+  departures_.forget(from.id);
+  if (absorbed) step.result.retired.push_back(*absorbed);
+  step.map.reassign_object(old, from.id);
+  std::replace(step.owners.begin(), step.owners.end(), old, from.id);
+  library_.rename(old, from.id);
+  auto& retired = step.result.retired;
+  retired.erase(std::remove(retired.begin(), retired.end(), from.id), retired.end());
+  // Its other sides went with it, but for those whose place was seen empty.
+  std::vector<Surfel> sides;
+  const Eigen::Isometry3f T = T_new_old.cast<float>();
+  for (Surfel s : from.surfels) {
+    s.point_W = T * s.point_W;
+    s.normal_W = T.linear() * s.normal_W;
+    s.seen_through = 0;
+    if (!seen_empty(step.map, s.point_W)) sides.push_back(s);
+  }
+  found.model.add(sides);
+  found.icp_target.reset();
+  found.most_surfels = found.model.surfels().size();
+  refit_box(step, found);
+  found.first_seen_ns = from.first_seen_ns;
+  found.seen_by.insert(from.seen_by.begin(), from.seen_by.end());
+  found.confirmed = true;
+  found.arrival = Arrival::kArrived;
+  found.moved = true;
+  found.added_ns.reset();
+  found.reported_box = found.box;
+  found.lost = 0;
+  found.changed = false;  // it was listed under its old id
+  mark_changed(found);
+  ObjectEvent& event = add_event(step, EventKind::kMoved, found, rule);
+  // Where all that is known of it was; of what departed, only a part may have been known.
+  OrientedBox before = found.box;
+  before.pose.position_W = T_new_old.inverse() * before.pose.position_W;
+  const Eigen::Matrix3d& R = T_new_old.linear();
+  before.pose.yaw_rad -= std::atan2(R(1, 0), R(0, 0));
+  event.previous_box = before;
+  event.absorbed = absorbed;
+  event.evidence = from.evidence;
+  event.evidence.rule = rule;
+}
+
+}  // namespace pocd

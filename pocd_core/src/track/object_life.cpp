@@ -1,0 +1,534 @@
+// ObjectTracker: joining, losing surface, removing, confirming and reporting objects.
+#include <algorithm>
+#include <cmath>
+
+#include "pocd/common/cell_index.hpp"
+#include "tracker_step.hpp"
+
+namespace pocd {
+namespace {
+
+/// Two objects are seen in one piece when this many points of each are measured on it.
+constexpr int kSharedPoints = 10;
+/// Share of a found object that lies within another one's box when it is another side of it.
+constexpr double kInsideShare = 0.6;
+/// The same for one that arrived.
+constexpr double kWithinShare = 0.9;
+/// Two objects are one when this share of the smaller one lies on the other.
+constexpr double kSameShare = 0.5;
+/// A part that is smaller than this share of its object and of the least area that counts is an
+/// edge: it is dropped, and the object reported as updated only when its box changes.
+constexpr double kPartShare = 0.1;
+/// The rest of an object that is found gone stands when at least this share of what was seen since
+/// is in place.
+constexpr double kStandingShare = 0.15;
+/// Looks in a row before a known object is taken for gone, whatever its belief.
+constexpr int kGoneLooks = 3;
+/// A candidate that was seen through in this many looks was never there, or moves.
+constexpr int kCandidateGoneLooks = 2;
+/// An object that lost more than this share of its surface to erosion is gone.
+constexpr double kLeastSurfelShare = 0.15;
+
+/// Marks what belongs to the marked surfels among those that nothing is known of: the ones nearer
+/// to a marked surfel than to a standing one.
+void mark_unseen(const std::vector<Surfel>& surfels, const std::vector<std::uint8_t>& standing,
+                 std::vector<std::uint8_t>& marked) {
+  // A few of each are enough to tell which are nearer.
+  constexpr std::size_t kSample = 200;
+  std::vector<std::size_t> gone, there;
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    if (marked[i]) gone.push_back(i);
+    if (standing[i]) there.push_back(i);
+  }
+  const auto nearest2 = [&](const std::vector<std::size_t>& set, std::size_t i) {
+    const std::size_t step = std::max<std::size_t>(1, set.size() / kSample);
+    float best = std::numeric_limits<float>::infinity();
+    for (std::size_t k = 0; k < set.size(); k += step)
+      best = std::min(best, (surfels[set[k]].point_W - surfels[i].point_W).squaredNorm());
+    return best;
+  };
+  std::vector<std::uint8_t> more = marked;
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    if (!marked[i] && !standing[i]) more[i] = nearest2(gone, i) < nearest2(there, i) ? 1 : 0;
+  }
+  marked = more;
+}
+
+/// Size of the largest connected piece of the marked surfels.
+std::size_t largest_piece(const std::vector<Surfel>& surfels,
+                          const std::vector<std::uint8_t>& marked, double reach_m) {
+  CellIndex cells;
+  const float inverse = static_cast<float>(1.0 / reach_m);
+  std::vector<std::int32_t> parent;
+  std::vector<Eigen::Vector3f> points;
+  const auto root = [&](std::int32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    if (!marked[i]) continue;
+    const auto k = static_cast<std::int32_t>(points.size());
+    const Eigen::Vector3f& p = surfels[i].point_W;
+    points.push_back(p);
+    parent.push_back(k);
+    cells.insert(cell_key(p, inverse), k);
+    const auto x = static_cast<std::int64_t>(std::floor(p.x() * inverse));
+    const auto y = static_cast<std::int64_t>(std::floor(p.y() * inverse));
+    const auto z = static_cast<std::int64_t>(std::floor(p.z() * inverse));
+    for (int n = 0; n < 27; ++n) {
+      const auto other = cells.find(cell_key(x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1));
+      if (other == CellIndex::kNone) continue;
+      const std::int32_t a = root(other), b = root(k);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<std::size_t> size(points.size(), 0);
+  std::size_t most = 0;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    most = std::max(most, ++size[root(static_cast<std::int32_t>(k))]);
+  return most;
+}
+
+OrientedBox box_of(const std::vector<Surfel>& surfels) {
+  Points points, normals;
+  for (const Surfel& s : surfels) {
+    points.push_back(s.point_W);
+    normals.push_back(s.normal_W);
+  }
+  return fit_box(points, normals, 0.005);
+}
+
+}  // namespace
+
+bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) const {
+  // What moved as a whole is one thing; only pieces that arrived with it may be of it.
+  if (a.moved && b.moved) return false;
+  const bool a_arrived = a.arrival == Arrival::kArrived, b_arrived = b.arrival == Arrival::kArrived;
+  return a_arrived == b_arrived;
+}
+
+bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) const {
+  const bool a_less = a.model.surfels().size() < b.model.surfels().size();
+  const LibraryObject& small = a_less ? a : b;
+  const LibraryObject& large = a_less ? b : a;
+  const auto reach = static_cast<float>(
+      std::max(config_.segmentation.cluster_tolerance_m, 2.0 * config_.map.voxel_size_m));
+  int contacts = 0, checked = 0;
+  for (const Surfel& s : small.model.surfels()) {
+    if (s.hits < 2 || s.seen_through > 0) continue;
+    ++checked;
+    const int other = large.model.nearest(s.point_W, reach);
+    contacts += other != ObjectModel::kNone && large.model.surfels()[other].seen_through == 0;
+  }
+  // A seam, not a spot: about the square root of the smaller surface's size.
+  return contacts >= std::max(3.0, 0.5 * std::sqrt(static_cast<double>(checked)));
+}
+
+bool ObjectTracker::coincide(const LibraryObject& a, const LibraryObject& b) const {
+  const bool a_less = a.model.surfels().size() < b.model.surfels().size();
+  const LibraryObject& small = a_less ? a : b;
+  const LibraryObject& large = a_less ? b : a;
+  if (box_overlap(a.box, b.box, 2.0 * config_.map.voxel_size_m) < kSameShare) return false;
+  const auto reach = static_cast<float>(1.5 * config_.map.voxel_size_m);
+  const std::size_t step = std::max<std::size_t>(1, small.model.surfels().size() / 100);
+  std::size_t asked = 0, same = 0;
+  for (std::size_t i = 0; i < small.model.surfels().size(); i += step) {
+    ++asked;
+    same += large.model.nearest(small.model.surfels()[i].point_W, reach) != ObjectModel::kNone;
+  }
+  return static_cast<double>(same) >= kSameShare * static_cast<double>(asked);
+}
+
+void ObjectTracker::join_objects(Step& step) {
+  const int enough = config_.state.merge_frames;
+  std::vector<std::pair<ObjectId, ObjectId>> joined;
+  for (std::size_t a = 0; a < step.look_count; ++a) {
+    Look& look_a = looks_[a];
+    if (look_a.verdict != Verdict::kInPlace || look_a.contested) continue;
+    for (std::size_t b = a + 1; b < step.look_count; ++b) {
+      Look& look_b = looks_[b];
+      LibraryObject &x = *look_a.object, &y = *look_b.object;
+      if (look_b.verdict != Verdict::kInPlace || look_b.contested || x.class_id != y.class_id ||
+          (!may_be_one(x, y) && !coincide(x, y))) {
+        continue;
+      }
+      bool one_piece = false, apart = false;
+      for (const auto& t : look_a.sighting.touches) {
+        if (t.hit < kSharedPoints) continue;
+        for (const auto& u : look_b.sighting.touches) {
+          if (u.hit < kSharedPoints) continue;
+          one_piece |= t.observation == u.observation;
+          apart |= t.observation != u.observation &&
+                   step.observations.list[t.observation].instance != 0 &&
+                   step.observations.list[u.observation].instance != 0;
+        }
+      }
+      const auto count = x.companions.find(y.id);
+      if (!one_piece || apart) {
+        // Once seen as two, they have to be seen as one for as long again.
+        const bool both =
+            look_a.sighting.hit >= kSharedPoints && look_b.sighting.hit >= kSharedPoints;
+        if (both && count != x.companions.end() && --count->second <= 0) x.companions.erase(count);
+        continue;
+      }
+      if (coincide(x, y)) {
+        joined.emplace_back(x.id, y.id);
+        continue;
+      }
+      int& looks = x.companions[y.id];
+      if (++looks < enough) continue;
+      looks = 0;
+      if (connected(x, y)) joined.emplace_back(x.id, y.id);
+    }
+  }
+  for (const auto& [a, b] : joined) {
+    LibraryObject *survivor = library_.find(a), *absorbed = library_.find(b);
+    if (!survivor || !absorbed) continue;
+    // What is known outside goes on; of two such, the older one.
+    if (absorbed->confirmed && !survivor->confirmed) std::swap(survivor, absorbed);
+    absorb(step, *survivor, *absorbed);
+  }
+}
+
+void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed) {
+  const ObjectId absorbed_id = absorbed.id;
+  const bool was_known = absorbed.confirmed;
+  survivor.model.absorb(absorbed.model);
+  survivor.icp_target.reset();
+  survivor.most_surfels = std::max(survivor.most_surfels, survivor.model.surfels().size());
+  // Both were seen in the same looks, for the most part.
+  survivor.observations = std::max(survivor.observations, absorbed.observations);
+  survivor.seen_by.insert(absorbed.seen_by.begin(), absorbed.seen_by.end());
+  survivor.in_place_ns = std::max(survivor.in_place_ns, absorbed.in_place_ns);
+  survivor.last_seen_ns = std::max(survivor.last_seen_ns, absorbed.last_seen_ns);
+  survivor.companions.clear();
+  mark_changed(survivor);
+  step.map.reassign_object(absorbed_id, survivor.id);
+  std::replace(step.owners.begin(), step.owners.end(), absorbed_id, survivor.id);
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (looks_[n].object != &absorbed) continue;
+    looks_[n].object = &survivor;
+    looks_[n].sighting.sights.clear();  // of surfels that are listed elsewhere now
+  }
+  library_.erase(absorbed_id);
+  refit_box(step, survivor);
+  if (!was_known) return;
+  step.result.retired.push_back(absorbed_id);
+  add_event(step, EventKind::kUpdated, survivor, "joined_" + std::to_string(to_index(absorbed_id)))
+      .absorbed = absorbed_id;
+  survivor.reported_box = survivor.box;
+}
+
+void ObjectTracker::lose_surface(Step& step) {
+  const int frames = config_.state.erode_frames;
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    Look& look = looks_[n];
+    const auto& sights = look.sighting.sights;
+    if (sights.empty()) continue;
+    LibraryObject& object = *look.object;
+    auto& surfels = object.model.surfels();
+    // Fusion appends; the first ones are still those that were looked at.
+    std::size_t pending = 0, gone = 0;
+    for (std::size_t i = 0; i < sights.size(); ++i) {
+      if (sights[i] == Sight::kSeenThrough && surfels[i].seen_through < 250)
+        ++surfels[i].seen_through;
+      if (sights[i] != Sight::kHit || !look.fits) continue;
+      surfels[i].seen_through = 0;
+      surfels[i].last_hit_ns = step.frame.stamp_ns;
+    }
+    if (frames == 0 || look.verdict == Verdict::kUnobserved ||
+        look.verdict == Verdict::kDisplaced) {
+      continue;
+    }
+    for (const Surfel& s : surfels) {
+      gone += s.seen_through >= frames;
+      pending += s.seen_through > 0 && s.seen_through < frames;
+    }
+    if (gone == 0) {
+      object.looks_losing = 0;
+      continue;
+    }
+    // A part that is being found gone is taken as a whole.
+    if (pending > gone / 10 && ++object.looks_losing < 2 * frames) continue;
+    object.looks_losing = 0;
+    std::vector<std::uint8_t> marked(surfels.size(), 0);
+    for (std::size_t i = 0; i < surfels.size(); ++i) marked[i] = surfels[i].seen_through >= frames;
+    lose_part(step, object, marked, "part_seen_through");
+  }
+}
+
+void ObjectTracker::lose_part(Step& step, LibraryObject& object,
+                              const std::vector<std::uint8_t>& marked, const std::string& rule) {
+  const OrientedBox whole_box = object.box;
+  const std::size_t before = object.model.surfels().size();
+  const std::size_t piece =
+      largest_piece(object.model.surfels(), marked, 2.0 * config_.map.voxel_size_m);
+  std::vector<Surfel> lost = object.model.extract(marked);
+  object.icp_target.reset();
+  object.lost += lost.size();
+  mark_changed(object);
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (looks_[n].object == &object) looks_[n].sighting.sights.clear();
+  }
+  if (!object.model.surfels().empty()) refit_box(step, object);
+  const bool is_part = object.confirmed && piece >= 2 * least_surfels() &&
+                       static_cast<double>(piece) >= kPartShare * static_cast<double>(before);
+  if (!is_part) return;
+  const IcpTarget gone = [&] {
+    Points points, normals;
+    for (const Surfel& s : lost) points.push_back(s.point_W), normals.push_back(s.normal_W);
+    return IcpTarget(points, normals, config_.map.voxel_size_m, config_.map.truncation_m() * 2.0);
+  }();
+  Points points, normals;
+  for (const Surfel& s : object.model.surfels())
+    points.push_back(s.point_W), normals.push_back(s.normal_W);
+  std::optional<IcpTarget> standing;
+  if (!points.empty())
+    standing.emplace(points, normals, config_.map.voxel_size_m, config_.map.truncation_m() * 2.0);
+  const OrientedBox lost_box = box_of(lost);
+  const double reach = 0.5 * lost_box.size_m.norm() + config_.map.truncation_m();
+  clear_gone(step, object.id, [&](const Eigen::Vector3d& center_W) {
+    if ((center_W - lost_box.pose.position_W).norm() > reach) return false;
+    const auto a = gone.nearest((center_W - gone.origin_W()).cast<float>());
+    if (!a) return false;
+    if (!standing) return true;
+    const auto b = standing->nearest((center_W - standing->origin_W()).cast<float>());
+    return !b || a->squared_distance_m2 < b->squared_distance_m2;
+  });
+  Departure departure;
+  departure.id = library_.reserve_id();
+  departure.part_of = object.id;
+  departure.class_id = object.class_id;
+  departure.box = lost_box;
+  departure.surfels = std::move(lost);
+  departure.first_seen_ns = object.first_seen_ns;
+  // When most of it was still there: a few points lie on what came after it.
+  std::vector<StampNs> hits;
+  for (const Surfel& s : departure.surfels) hits.push_back(s.last_hit_ns);
+  std::nth_element(hits.begin(), hits.begin() + static_cast<std::ptrdiff_t>(hits.size() / 2),
+                   hits.end());
+  departure.in_place_ns = hits[hits.size() / 2];
+  departure.departed_ns = step.frame.stamp_ns;
+  departure.seen_by = object.seen_by;
+  departure.evidence = evidence_of(step, object);
+  if (object.belief.stationarity() < config_.state.remove_below) {
+    // That was measured of what is gone. The rest was measured in place.
+    begin_anew(step, object);
+  }
+  add_event(step, EventKind::kUpdated, object, "part_removed").previous_box = whole_box;
+  object.reported_box = object.box;
+  object.lost = 0;
+  depart(step, std::move(departure), rule);
+}
+
+void ObjectTracker::begin_anew(Step& step, LibraryObject& object) {
+  object.belief.alpha = config_.state.initial_stationarity * config_.state.initial_count;
+  object.belief.beta = (1.0 - config_.state.initial_stationarity) * config_.state.initial_count;
+  step.evidence.erase(object.id);
+}
+
+void ObjectTracker::clear_gone(Step& step, ObjectId id,
+                               const std::function<bool(const Eigen::Vector3d&)>& inside) {
+  const OrganizedCloud& cloud = step.cloud;
+  const Pose T_C_W = cloud.T_W_C.inverse();
+  const double near_m = 2.0 * config_.map.voxel_size_m;
+  const auto measured_now = [&](const Eigen::Vector3d& center_W) {
+    const Eigen::Vector3d p = T_C_W * center_W;
+    if (p.z() < near_m) return false;
+    const int col = static_cast<int>(cloud.camera.fx * p.x() / p.z() + cloud.camera.cx + 0.5);
+    const int row = static_cast<int>(cloud.camera.fy * p.y() / p.z() + cloud.camera.cy + 0.5);
+    if (col < 0 || row < 0 || col >= cloud.width || row >= cloud.height) return false;
+    return std::abs(cloud.depth_m[static_cast<std::size_t>(row) * cloud.width + col] - p.z()) <
+           near_m;
+  };
+  std::vector<const LibraryObject*> others;
+  if (const LibraryObject* object = library_.find(id)) {
+    for (const ObjectId other :
+         library_.near(object->box.pose.position_W, 0.5 * object->box.size_m.norm())) {
+      if (other != id) others.push_back(library_.find(other));
+    }
+  }
+  step.map.clear_object_where(id, [&](const Eigen::Vector3d& center_W) {
+    if (!inside(center_W) || measured_now(center_W)) return false;
+    return std::none_of(others.begin(), others.end(), [&](const LibraryObject* other) {
+      return is_inside(other->box, near_m, center_W.cast<float>()) &&
+             other->model.nearest(center_W.cast<float>(), static_cast<float>(near_m)) !=
+                 ObjectModel::kNone;
+    });
+  });
+}
+
+void ObjectTracker::remove_objects(Step& step) {
+  std::vector<std::pair<LibraryObject*, Verdict>> looked;
+  for (std::size_t n = 0; n < step.look_count; ++n)
+    looked.emplace_back(looks_[n].object, looks_[n].verdict);
+  std::sort(looked.begin(), looked.end());
+  looked.erase(std::unique(looked.begin(), looked.end(),
+                           [](const auto& a, const auto& b) { return a.first == b.first; }),
+               looked.end());
+  std::sort(looked.begin(), looked.end(),
+            [](const auto& a, const auto& b) { return a.first->id < b.first->id; });
+  for (const auto& [object, verdict] : looked) {
+    if (!object->confirmed) {
+      if (object->looks_unobserved >= kCandidateGoneLooks ||
+          object->belief.stationarity() < config_.state.remove_below) {
+        remove(step, *object, "candidate_seen_through");
+      } else if (object->looks_missed > config_.state.tentative_frames) {
+        remove(step, *object, "never_confirmed");
+      }
+      continue;
+    }
+    if (static_cast<double>(object->model.surfels().size()) <
+        kLeastSurfelShare * static_cast<double>(object->most_surfels)) {
+      remove(step, *object, "nothing_left");
+      continue;
+    }
+    if (verdict != Verdict::kUnobserved || object->looks_unobserved < kGoneLooks ||
+        object->belief.stationarity() >= config_.state.remove_below) {
+      continue;
+    }
+    // An act is no larger than its evidence: what was measured in place since stands.
+    const auto& surfels = object->model.surfels();
+    std::vector<std::uint8_t> gone(surfels.size(), 0), standing(surfels.size(), 0);
+    std::size_t gone_count = 0, standing_count = 0;
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      gone[i] = surfels[i].seen_through > 0;
+      standing[i] = !gone[i] && surfels[i].last_hit_ns >= object->unobserved_since_ns;
+      gone_count += gone[i];
+      standing_count += standing[i];
+    }
+    if (static_cast<double>(standing_count) <=
+        kStandingShare * static_cast<double>(standing_count + gone_count)) {
+      remove(step, *object, "stationarity_below_threshold");
+      continue;
+    }
+    mark_unseen(surfels, standing, gone);
+    object->looks_unobserved = 0;
+    lose_part(step, *object, gone, "stationarity_below_threshold");
+    if (object->belief.stationarity() < config_.state.remove_below) begin_anew(step, *object);
+  }
+}
+
+void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string& rule) {
+  Departure departure;
+  departure.id = object.id;
+  departure.class_id = object.class_id;
+  departure.box = object.box;
+  departure.surfels = object.model.surfels();
+  departure.first_seen_ns = object.first_seen_ns;
+  departure.in_place_ns = object.in_place_ns;
+  departure.departed_ns = step.frame.stamp_ns;
+  departure.seen_by = object.seen_by;
+  departure.evidence = evidence_of(step, object);
+  const bool was_known = object.confirmed;
+  clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
+  step.map.reassign_object(object.id, ObjectId::kNone);  // what stays is not of it
+  std::replace(step.owners.begin(), step.owners.end(), object.id, ObjectId::kNone);
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (looks_[n].object == &object) looks_[n].sighting.sights.clear();
+  }
+  const ObjectId id = object.id;
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (looks_[n].object != &object) continue;
+    std::swap(looks_[n], looks_[--step.look_count]);
+    --n;
+  }
+  library_.erase(id);
+  if (was_known) depart(step, std::move(departure), rule);
+}
+
+void ObjectTracker::confirm_objects(Step& step) {
+  const auto needed = static_cast<std::uint32_t>(config_.state.confirm_observations);
+  const auto wait = static_cast<std::uint32_t>(config_.state.wait_for_doubt_frames);
+  std::vector<ObjectId> ready;
+  for (const ObjectId id : step.owners) {
+    const LibraryObject* object = library_.find(id);
+    if (object && !object->confirmed && object->observations >= needed) ready.push_back(id);
+  }
+  std::sort(ready.begin(), ready.end());
+  ready.erase(std::unique(ready.begin(), ready.end()), ready.end());
+  for (const ObjectId id : ready) {
+    LibraryObject* object = library_.find(id);
+    if (!object || object->confirmed) continue;
+    if (object->model.surfels().size() < least_surfels()) continue;
+    if (LibraryObject* whole = whole_of(step, *object)) {
+      absorb(step, *whole, *object);
+      continue;
+    }
+    if (object->observations < needed + wait && origin_in_doubt(step, *object)) continue;
+    confirm(step, *object);
+  }
+}
+
+bool ObjectTracker::seen_apart(const Step& step, ObjectId a, ObjectId b) const {
+  const auto instance_of = [&](std::size_t p) {
+    return step.observations.list[step.parts[p].observation].instance;
+  };
+  for (std::size_t p = 0; p < step.parts.size(); ++p) {
+    if (step.owners[p] != a || instance_of(p) == 0) continue;
+    for (std::size_t q = 0; q < step.parts.size(); ++q) {
+      if (step.owners[q] == b && instance_of(q) != 0 && instance_of(q) != instance_of(p))
+        return true;
+    }
+  }
+  return false;
+}
+
+LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& found) {
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  const bool arrived = found.arrival == Arrival::kArrived;
+  const double margin_m = 2.0 * config_.map.voxel_size_m;
+  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
+    LibraryObject* other = library_.find(id);
+    if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
+        other->looks_unobserved > 0 || seen_apart(step, found.id, id)) {
+      continue;
+    }
+    if (coincide(found, *other)) return other;
+    std::size_t inside = 0;
+    for (const Surfel& s : found.model.surfels())
+      inside += is_inside(other->box, margin_m, s.point_W);
+    const double share =
+        static_cast<double>(inside) / static_cast<double>(found.model.surfels().size());
+    // No other thing stands within a thing.
+    if (share >= kWithinShare) return other;
+    // What arrived is a side of what arrived lately; what was found, of what stands longer, too.
+    const bool other_arrived = other->arrival == Arrival::kArrived;
+    const bool lately = other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns;
+    if (arrived && !(other_arrived && lately)) continue;
+    if (connected(found, *other) || share >= kInsideShare) return other;
+  }
+  return nullptr;
+}
+
+void ObjectTracker::report_changes(Step& step) {
+  find_far_moves(step);
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
+  std::vector<LibraryObject*> touched;
+  for (const ObjectId id : changed_) {
+    LibraryObject* object = library_.find(id);  // null when removed since
+    if (!object) continue;
+    object->changed = false;
+    if (object->confirmed) touched.push_back(object);
+  }
+  changed_.clear();
+  for (LibraryObject* object : touched) {
+    const double shift_m =
+        (object->box.pose.position_W - object->reported_box.pose.position_W).norm();
+    const double growth_m =
+        (object->box.size_m - object->reported_box.size_m).cwiseAbs().maxCoeff();
+    if (shift_m <= notable_m && growth_m <= notable_m) continue;
+    // Seen better, what was reported as new may turn out to be what departed before.
+    if (object->added_ns && find_origin(step, *object)) continue;
+    add_event(step, EventKind::kUpdated, *object, object->lost > 0 ? "part_removed" : "grew");
+    object->reported_box = object->box;
+    object->lost = 0;
+  }
+  for (const LibraryObject* object : touched)
+    step.result.changed_objects.push_back(snapshot(*object));
+  std::sort(step.result.retired.begin(), step.result.retired.end());
+}
+
+}  // namespace pocd

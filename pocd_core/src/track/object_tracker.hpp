@@ -1,0 +1,126 @@
+// The objects that a frame is about: verdicts, beliefs, surfaces, and what becomes of each of them.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pocd/association/associate.hpp"
+#include "pocd/map/tsdf_map.hpp"
+#include "pocd/observe/free_space.hpp"
+#include "pocd/observe/look.hpp"
+#include "pocd/observe/parts.hpp"
+#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/pipeline/pipeline_config.hpp"
+#include "pocd/segmentation/planes.hpp"
+#include "pocd/track/departures.hpp"
+
+namespace pocd {
+
+/// Owns the object library. Not thread-safe.
+class ObjectTracker {
+ public:
+  explicit ObjectTracker(const PipelineConfig& config);
+
+  const ObjectLibrary& library() const { return library_; }
+
+  /// Updates all beliefs from one frame; fuses, adds, moves and removes objects; clears the voxels
+  /// of what is gone. `owner_of_pixel` gets, per grid pixel of an observation, the object that owns
+  /// the surface there, 0 where that is not decided yet.
+  void update(const Frame& frame, const OrganizedCloud& cloud, const DepthField& field,
+              const Observations& observations, const GroundModel& ground, TsdfMap& map,
+              std::vector<std::uint32_t>& owner_of_pixel, FrameResult& result);
+
+  /// From now on stamps go on from `now_ns`, which lies before those that are kept: all that is
+  /// known becomes known from just before it.
+  void set_clock_back(StampNs now_ns);
+
+ private:
+  struct Step;  ///< what the parts of one update share
+
+  // In the order of update().
+  void look_at_objects(Step& step);
+  void update_beliefs(Step& step);
+  void fuse_parts(Step& step);
+  void join_objects(Step& step);
+  void lose_surface(Step& step);
+  void remove_objects(Step& step);
+  void confirm_objects(Step& step);
+  void report_changes(Step& step);
+
+  /// The moment of the object that this frame belongs to, entered on the first call.
+  Moment& moment_of(Step& step, LibraryObject& object);
+  /// Puts the frame's measurement into the belief and into the step's evidence; false when another
+  /// robot has told more of the object in this moment.
+  bool measure(Step& step, Look& look, double delta_m);
+  double measurement_sigma(const Step& step, const LibraryObject& object) const;
+  void move_displaced(Step& step, Look& look);
+  void fuse(Step& step, LibraryObject& object, const std::vector<SurfacePoint>& points);
+  LibraryObject& create(Step& step, ClassId class_id);
+  void refit_box(Step& step, LibraryObject& object);
+  void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
+  /// Whether what is known of two objects allows that they are one.
+  bool may_be_one(const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether two objects of one piece in the image are one piece of surface in the map.
+  bool connected(const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether two objects are one surface, known twice.
+  bool coincide(const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether the frame's masks say that two objects are two things.
+  bool seen_apart(const Step& step, ObjectId a, ObjectId b) const;
+  /// The known object that a new one, which nobody saw arrive, is another side of; or null.
+  LibraryObject* whole_of(const Step& step, const LibraryObject& found);
+  /// Takes the marked surfels out of the object and the map, and reports them as gone when they are
+  /// more than an edge.
+  void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
+                 const std::string& rule);
+  /// Gives the rest of an object the belief of a new one.
+  void begin_anew(Step& step, LibraryObject& object);
+  /// Clears the object's voxels where `inside` says so, but for those at which this frame or
+  /// another object has a surface.
+  void clear_gone(Step& step, ObjectId id,
+                  const std::function<bool(const Eigen::Vector3d&)>& inside);
+  void remove(Step& step, LibraryObject& object, const std::string& rule);
+  /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
+  void depart(Step& step, Departure departure, const std::string& rule);
+  void confirm(Step& step, LibraryObject& object);
+  /// Reports the object as moved when it is one that departed; false when there is none.
+  bool find_origin(Step& step, LibraryObject& object);
+  /// Whether a like object near by is being found gone: then the new one may be that one.
+  bool origin_in_doubt(const Step& step, const LibraryObject& object);
+  /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
+  std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found,
+                                  StampNs now_ns) const;
+  /// The known or new object that is what departed, by the shortest motion; or null.
+  LibraryObject* find_departed(const Step& step, const Departure& departure, Motion& motion);
+  /// Moves over a distance, once what departed and what arrived are known for kFarWaitS.
+  void find_far_moves(Step& step);
+  void report_move(Step& step, LibraryObject& found, const Departure& from, const Pose& T_new_old,
+                   const std::string& rule);
+  void mark_changed(LibraryObject& object);
+  Evidence evidence_of(const Step& step, const LibraryObject& object) const;
+  ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
+                         const std::string& rule);
+  bool seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const;
+  Arrival arrival_of(const LibraryObject& object) const;
+  /// Surfels that make a piece of surface of the least area that counts.
+  std::size_t least_surfels() const;
+
+  PipelineConfig config_;
+  ObjectLibrary library_;
+  FreeSpace free_space_;
+  Departures departures_;
+  struct ArrivedObject {
+    ObjectId object;
+    StampNs since_ns;
+  };
+  std::deque<ArrivedObject> arrivals_;  ///< added, not asked yet whether they came from afar
+  std::uint64_t next_event_ = 1;
+  std::vector<Look> looks_;        ///< a frame uses the first ones; memory is kept between frames
+  std::vector<ObjectId> changed_;  ///< since the last result
+};
+
+}  // namespace pocd

@@ -1,0 +1,62 @@
+#include "pocd/track/departures.hpp"
+
+#include <gtest/gtest.h>
+
+namespace pocd {
+namespace {
+
+constexpr StampNs kSecond = 1'000'000'000;
+
+Departure departed(std::uint32_t id, StampNs departed_ns) {
+  Departure d;
+  d.id = ObjectId{id};
+  d.first_seen_ns = departed_ns - 50 * kSecond;
+  d.in_place_ns = departed_ns - kSecond;
+  d.departed_ns = departed_ns;
+  return d;
+}
+
+std::vector<std::uint32_t> ids(const std::deque<Departure>& list) {
+  std::vector<std::uint32_t> out;
+  for (const Departure& d : list) out.push_back(to_index(d.id));
+  return out;
+}
+
+TEST(Departures, AreKeptForTheWindowOldestFirst) {
+  Departures departures;
+  departures.add(departed(3, 100 * kSecond));
+  departures.add(departed(1, 130 * kSecond));
+  departures.add(departed(2, 150 * kSecond));
+  EXPECT_EQ(ids(departures.recent(160 * kSecond, 60.0)), (std::vector<std::uint32_t>{3, 1, 2}))
+      << "at the window's end";
+  EXPECT_EQ(ids(departures.recent(160 * kSecond + 1, 60.0)), (std::vector<std::uint32_t>{1, 2}));
+  EXPECT_EQ(ids(departures.recent(100 * kSecond, 60.0)), (std::vector<std::uint32_t>{1, 2}))
+      << "what was forgotten does not come back";
+  EXPECT_TRUE(departures.recent(1000 * kSecond, 60.0).empty());
+}
+
+TEST(Departures, ForgetTakesOutOneId) {
+  Departures departures;
+  for (const std::uint32_t id : {1u, 2u, 3u}) departures.add(departed(id, 100 * kSecond));
+  departures.forget(ObjectId{2});
+  departures.forget(ObjectId{77});
+  EXPECT_EQ(ids(departures.recent(100 * kSecond, 60.0)), (std::vector<std::uint32_t>{1, 3}));
+}
+
+TEST(Departures, AClockThatIsSetBackMakesThemJustDeparted) {
+  Departures departures;
+  departures.add(departed(1, 3500 * kSecond));
+  departures.add(departed(2, 3600 * kSecond));
+  departures.set_clock_back(10 * kSecond);
+  const auto& kept = departures.recent(11 * kSecond, 60.0);
+  ASSERT_EQ(kept.size(), 2u);
+  for (const Departure& d : kept) {
+    EXPECT_EQ(d.departed_ns, 10 * kSecond);
+    EXPECT_LE(d.in_place_ns, d.departed_ns);
+    EXPECT_LE(d.first_seen_ns, d.in_place_ns);
+  }
+  EXPECT_TRUE(departures.recent(71 * kSecond, 60.0).empty()) << "they grow old by the new clock";
+}
+
+}  // namespace
+}  // namespace pocd
