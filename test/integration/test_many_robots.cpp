@@ -10,18 +10,33 @@
 namespace pocd {
 namespace {
 
-TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
-  constexpr std::size_t kMost = 200;
+/// A node's intake on a domain of its own. Members are made in the order of their declaration.
+struct IntakeOnABus {
   const TestDomain domain;
   dds::BusWatch watch;
-  dds::BusOptions options{domain.number(), "", "intake"};
-  options.listener = &watch;
-  NodeConfig config;
-  config.segmentation = "absent";
-  dds::FrameQueue queue(1);
-  dds::LatencyLog latency("");
-  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch,
-                     queue, latency);
+  NodeConfig config = without_masks();
+  dds::FrameQueue queue{1};
+  dds::LatencyLog latency{""};
+  dds::Intake intake{listening(domain, watch), config, PipelineConfig{}, watch, queue, latency};
+
+ private:
+  static NodeConfig without_masks() {
+    NodeConfig config;
+    config.segmentation = "absent";
+    return config;
+  }
+  static std::shared_ptr<dds::Participant> listening(const TestDomain& domain,
+                                                     dds::BusWatch& watch) {
+    dds::BusOptions options{domain.number(), "", "intake"};
+    options.listener = &watch;
+    return std::make_shared<dds::Participant>(options);
+  }
+};
+
+TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
+  constexpr std::size_t kMost = 200;
+  IntakeOnABus node;
+  dds::Intake& intake = node.intake;
   const auto names = [&] {
     std::set<std::string> present;
     for (const auto& robot : intake.status().robots) {
@@ -29,7 +44,7 @@ TEST(Intake, TurnsRobotsAwayAndMeetsThemWhenThereIsRoom) {
     }
     return present;
   };
-  const auto bus = test_participant(domain);
+  const auto bus = test_participant(node.domain);
   using Writer = dds::Writer<sensor_msgs::msg::ImagePubSubType>;
   std::map<std::string, std::unique_ptr<Writer>> robots;
   for (std::size_t i = 0; i < kMost + 2; ++i) {
@@ -100,17 +115,9 @@ TEST(Intake, KeepsEveryStaticTransformOfAFleet) {
 // What one robot sends costs a look at that robot, not at the fleet.
 TEST(Intake, ASampleCostsALookAtItsRobotOnly) {
   constexpr int kRobots = 40, kSamples = 400;
-  const TestDomain domain;
-  dds::BusWatch watch;
-  dds::BusOptions options{domain.number(), "", "intake"};
-  options.listener = &watch;
-  NodeConfig config;
-  config.segmentation = "absent";
-  dds::FrameQueue queue(1);
-  dds::LatencyLog latency("");
-  dds::Intake intake(std::make_shared<dds::Participant>(options), config, PipelineConfig{}, watch,
-                     queue, latency);
-  const auto bus = test_participant(domain);
+  IntakeOnABus node;
+  dds::Intake& intake = node.intake;
+  const auto bus = test_participant(node.domain);
   std::vector<std::unique_ptr<RobotSender>> robots;
   for (int i = 0; i < kRobots; ++i) {
     robots.push_back(std::make_unique<RobotSender>(bus, "r" + std::to_string(i)));

@@ -10,16 +10,9 @@ namespace {
 
 std::shared_ptr<const IcpTarget> target_of(LibraryObject& object, double max_distance_m) {
   if (!object.icp_target) {
-    Points points, normals;
-    points.reserve(object.model.surfels().size());
-    normals.reserve(object.model.surfels().size());
-    for (const Surfel& s : object.model.surfels()) {
-      points.push_back(s.point_W);
-      normals.push_back(s.normal_W);
-    }
     const double inlier = 1.5 * object.model.spacing_m();
-    object.icp_target =
-        std::make_shared<IcpTarget>(points, normals, inlier, std::max(inlier, max_distance_m));
+    object.icp_target = std::make_shared<IcpTarget>(
+        icp_target(object.model.surfels(), inlier, std::max(inlier, max_distance_m)));
   }
   return object.icp_target;
 }
@@ -69,14 +62,26 @@ IcpOptions icp_options(const LibraryObject& object, const AssociationConfig& con
 
 }  // namespace
 
+IcpTarget icp_target(const std::vector<Surfel>& surfels, double inlier_distance_m,
+                     double max_correspondence_m) {
+  Points points, normals;
+  points.reserve(surfels.size());
+  normals.reserve(surfels.size());
+  for (const Surfel& s : surfels) {
+    points.push_back(s.point_W);
+    normals.push_back(s.normal_W);
+  }
+  return IcpTarget(points, normals, inlier_distance_m, max_correspondence_m);
+}
+
 std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
                                     const Pose& T_W_C, const Pose& start,
                                     const AssociationConfig& config) {
   if (object.model.surfels().empty() || observation.points.empty()) return std::nullopt;
   const Points source = icp_source(observation, config);
   const auto target = target_of(object, config.icp_max_distance_m);
-  return match_of(point_to_plane_icp(*target, source, icp_options(object, config), start), source, T_W_C,
-                  config);
+  return match_of(point_to_plane_icp(*target, source, icp_options(object, config), start), source,
+                  T_W_C, config);
 }
 
 }  // namespace pocd

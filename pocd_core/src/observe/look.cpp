@@ -121,9 +121,7 @@ const char* to_string(Verdict verdict) {
 }
 
 void judge(const OrganizedCloud& cloud, const DepthField& field, const Observations& observations,
-           const SightConfig& sight, const DepthNoise& noise, const AssociationConfig& config,
-           Look& look) {
-  (void)config;
+           const SightConfig& sight, const DepthNoise& noise, Look& look) {
   const LibraryObject& object = *look.object;
   sight_object(object.model.surfels(), object.class_id, min_hits(object), cloud, field,
                observations, sight, noise, look.sighting);
@@ -172,20 +170,18 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
   }
   if (around.points.size() < static_cast<std::size_t>(2 * kLeastPoints)) return;
   const Tally before = tally_of(look.sighting, observations, object.class_id, look.observation);
-  // Enough of its old place must be seen to tell.
+  // Too little of its old place is seen to tell.
   const int told = before.here + before.through + before.covered;
   if (told < 2 * kLeastPoints) return;
 
   // A wall says nothing of how far it slid along itself: each end may be the one that is seen.
-  const double yaw =
-      object.box.pose.yaw_rad + (object.box.size_m.x() < object.box.size_m.y() ? M_PI_2 : 0.0);
-  const Eigen::Vector3d along_W(std::cos(yaw), std::sin(yaw), 0.0);
+  const Eigen::Vector3d along_W = long_axis(object.box);
   double low = 1e9, high = -1e9;
   for (const SurfacePoint& p : around.points) {
     const double at = (p.point_W.cast<double>() - object.box.pose.position_W).dot(along_W);
     low = std::min(low, at), high = std::max(high, at);
   }
-  const double half = 0.5 * object.box.size_m.head<2>().maxCoeff();
+  const double half = 0.5 * longest_side(object.box);
   // Sides that were never seen before lie off the known surface.
   AssociationConfig loose = config;
   loose.max_dissimilarity = kUnseenShare;
@@ -205,7 +201,7 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     // Nothing of the old place is seen empty: then the new one must cover it and leave no room for
     // both, however thick the thing is behind its known side.
     const bool covers = before.through < kLeastPoints;
-    const double side_m = std::min(object.box.size_m.head<2>().maxCoeff(), object.box.size_m.z());
+    const double side_m = std::min(longest_side(object.box), object.box.size_m.z());
     if (covers && match->displacement_m > kTakenShare * side_m) continue;
     std::vector<Surfel> moved = object.model.surfels();
     const Eigen::Isometry3f T = match->T_new_old.cast<float>();

@@ -36,4 +36,9 @@ Evidence apply_measurement(LibraryObject& object, double delta_m, double sigma_m
   return evidence;
 }
 
+void forget_evidence(Belief& belief, const StateConfig& state) {
+  belief.alpha = state.initial_stationarity * state.initial_count;
+  belief.beta = (1.0 - state.initial_stationarity) * state.initial_count;
+}
+
 }  // namespace pocd

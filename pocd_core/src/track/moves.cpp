@@ -1,35 +1,34 @@
 // ObjectTracker: what departed and what arrived, and whether they are one thing.
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "pocd/association/associate.hpp"
 #include "pocd/association/point_to_plane_icp.hpp"
 #include "tracker_step.hpp"
 
 namespace pocd {
 namespace {
 
-/// The new surface lies on the old one, moved, with at most this share beside it.
+/// At most this share of the new surface lies beside the old one, moved there.
 constexpr double kOutlierShare = 0.2;
-/// With the known sides of it so far seen, so much may lie beside them: sides that were not known.
+/// When at least this share of the old surface is seen at the new place, more of the new one may
+/// lie beside it, up to kUnseenShare: sides that were not known.
 constexpr double kWholeShare = 0.6;
 constexpr double kUnseenShare = 0.5;
-/// At most this share of the old surface, moved, lies where nothing is.
+/// Of what is known of the old surface at the new place, at most this share lies where nothing is.
 constexpr double kEmptyShare = 0.15;
 /// At least this share of the old surface, moved, is seen at the new place.
 constexpr double kSeenShare = 0.2;
-/// A thing in a place that was never seen empty is the departed one only when it is nearer than
-/// this share of its length.
+/// A thing in a place that was never seen empty moved no farther than this, in its lengths.
 constexpr double kNearShare = 1.0;
+/// So far, in its lengths, a move is told at once.
+constexpr double kAtOnceShare = 1.0;
+/// A longer one is told after this time: another origin may be nearer [s].
+constexpr double kFarWaitS = 1.0;
 /// Share of the surface that a motion must explain more when it is longer by the thing's length.
 constexpr double kShortness = 0.5;
-/// Moves farther than that are told after this time: another thing may be nearer [s].
-constexpr double kFarWaitS = 1.0;
-/// Share of its length that a thing may have moved to be told so at once.
-constexpr double kAtOnceShare = 1.0;
+/// Points of the new surface that are aligned.
 constexpr std::size_t kAlignPoints = 600;
-
-double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
 
 /// The new one is no larger than the old one, and stands as high.
 bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) {
@@ -58,29 +57,21 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   if (distance_m > config_.state.relocation_reach_m + parts_m) return std::nullopt;
   if (!may_be(found.box, departure.box, slack_m)) return std::nullopt;
 
-  Points points, normals, source;
-  for (const Surfel& s : departure.surfels) {
-    points.push_back(s.point_W);
-    normals.push_back(s.normal_W);
-  }
+  Points source;
   const auto& surfels = found.model.surfels();
   const std::size_t step = std::max<std::size_t>(1, surfels.size() / kAlignPoints);
   for (std::size_t i = 0; i < surfels.size(); i += step) source.push_back(surfels[i].point_W);
   const double inlier_m = 1.5 * config_.map.voxel_size_m;
-  const IcpTarget target(points, normals, inlier_m,
-                         std::max(inlier_m, config_.association.icp_max_distance_m));
+  const IcpTarget target = icp_target(departure.surfels, inlier_m,
+                                      std::max(inlier_m, config_.association.icp_max_distance_m));
   IcpOptions options;
   options.max_iterations = config_.association.icp_iterations;
   options.robust_scale_m = config_.map.voxel_size_m;
-  // As it stands, and with the boxes' sides along each other; by the middles, and, for of each only
-  // a part may be known, by either end.
+  // With the heading that it has, and with the boxes' sides along each other. By the middles, and
+  // by either end, since of each only a part may be known.
   std::vector<Pose> starts{Pose::Identity()};
   const double turn_rad = departure.box.pose.yaw_rad - found.box.pose.yaw_rad;
-  const auto along_of = [](const OrientedBox& box) {
-    const double yaw = box.pose.yaw_rad + (box.size_m.x() < box.size_m.y() ? M_PI_2 : 0.0);
-    return Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
-  };
-  const Eigen::Vector3d along_W = along_of(departure.box);
+  const Eigen::Vector3d along_W = long_axis(departure.box);
   const double play_m = 0.5 * (longest_side(departure.box) - longest_side(found.box));
   for (int quarter = -1; quarter < 4; ++quarter) {
     Pose start = Pose::Identity();
@@ -134,17 +125,17 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
       continue;
     // Of motions that explain the same, the shortest: the sides of a box are alike.
     const double contradicted = static_cast<double>(empty) / static_cast<double>(seen + empty);
-    const double score =
-        1.0 - icp.dissimilarity - contradicted - kShortness * moved_m / longest_side(departure.box);
+    const double score = 1.0 - icp.dissimilarity - contradicted - kShortness * lengths;
     if (best && score <= best_score) continue;
     best_score = score;
     best = Motion{T_new_old, moved_m};
     enough = static_cast<double>(seen) >= kSeenShare * all;
   }
+  // The best one must be seen well enough; a worse one is no answer until then.
   return enough ? best : std::nullopt;
 }
 
-bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& object) {
+bool ObjectTracker::origin_in_doubt(const LibraryObject& object) {
   for (const ObjectId id :
        library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
     const LibraryObject* other = library_.find(id);
@@ -153,7 +144,6 @@ bool ObjectTracker::origin_in_doubt(const Step& step, const LibraryObject& objec
       return true;
     }
   }
-  (void)step;
   return false;
 }
 
@@ -226,10 +216,12 @@ void ObjectTracker::find_far_moves(Step& step) {
     if (LibraryObject* found = find_departed(step, d, motion))
       report_move(step, *found, d, motion.T_new_old, "found_again");
   }
-  while (!arrivals_.empty() && now_ns - arrivals_.front().since_ns >= wait_ns) {
-    LibraryObject* object = library_.find(arrivals_.front().object);
+  while (!arrivals_.empty()) {
+    LibraryObject* object = library_.find(arrivals_.front());
+    const bool open = object && object->added_ns;  // else it went, or moved, or is of another one
+    if (open && now_ns - *object->added_ns < wait_ns) break;
     arrivals_.pop_front();
-    if (object && object->added_ns) find_origin(step, *object);
+    if (open) find_origin(step, *object);
   }
 }
 
@@ -239,7 +231,7 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   object.reported_box = object.box;
   object.lost = 0;
   object.added_ns = step.frame.stamp_ns;
-  arrivals_.push_back({object.id, step.frame.stamp_ns});
+  arrivals_.push_back(object.id);
   mark_changed(object);
   add_event(step, EventKind::kAdded, object, to_string(object.arrival));
 }

@@ -107,7 +107,6 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     object->moment = {};
   }
   departures_.set_clock_back(before_ns);
-  for (ArrivedObject& arrived : arrivals_) bound(arrived.since_ns);
 }
 
 void ObjectTracker::look_at_objects(Step& step) {
@@ -117,8 +116,7 @@ void ObjectTracker::look_at_objects(Step& step) {
     if (looks_.size() <= step.look_count) looks_.emplace_back();
     Look& look = looks_[step.look_count];
     look.object = library_.find(id);
-    judge(step.cloud, step.field, step.observations, step.sight, config_.depth_noise,
-          config_.association, look);
+    judge(step.cloud, step.field, step.observations, step.sight, config_.depth_noise, look);
     const Sighting& s = look.sighting;
     if (s.hit + s.seen_through + s.occluded + s.unknown == 0) continue;
     ++step.look_count;
@@ -285,8 +283,7 @@ LibraryObject& ObjectTracker::create(Step& step, ClassId class_id) {
   object.class_id = class_id;
   object.stationarity_class = config_.classes.stationarity_class(class_id);
   object.belief.sigma = config_.state.initial_sigma_m;
-  object.belief.alpha = config_.state.initial_stationarity * config_.state.initial_count;
-  object.belief.beta = (1.0 - config_.state.initial_stationarity) * config_.state.initial_count;
+  forget_evidence(object.belief, config_.state);
   object.first_seen_ns = step.frame.stamp_ns;
   object.in_place_ns = step.frame.stamp_ns;
   // Another view of this moment tells nothing of what the object does between two moments.

@@ -71,13 +71,13 @@ class ObjectTracker {
   bool coincide(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether the frame's masks say that two objects are two things.
   bool seen_apart(const Step& step, ObjectId a, ObjectId b) const;
-  /// The known object that a new one, which nobody saw arrive, is another side of; or null.
+  /// The known object that a new one is another side of; or null.
   LibraryObject* whole_of(const Step& step, const LibraryObject& found);
   /// Takes the marked surfels out of the object and the map, and reports them as gone when they are
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
                  const std::string& rule);
-  /// Gives the rest of an object the belief of a new one.
+  /// The rest of an object has told nothing yet: alpha and beta of a new one, no measurement.
   void begin_anew(Step& step, LibraryObject& object);
   /// Clears the object's voxels where `inside` says so, but for those at which this frame or
   /// another object has a surface.
@@ -90,7 +90,7 @@ class ObjectTracker {
   /// Reports the object as moved when it is one that departed; false when there is none.
   bool find_origin(Step& step, LibraryObject& object);
   /// Whether a like object near by is being found gone: then the new one may be that one.
-  bool origin_in_doubt(const Step& step, const LibraryObject& object);
+  bool origin_in_doubt(const LibraryObject& object);
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
   std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found,
                                   StampNs now_ns) const;
@@ -113,11 +113,7 @@ class ObjectTracker {
   ObjectLibrary library_;
   FreeSpace free_space_;
   Departures departures_;
-  struct ArrivedObject {
-    ObjectId object;
-    StampNs since_ns;
-  };
-  std::deque<ArrivedObject> arrivals_;  ///< added, not asked yet whether they came from afar
+  std::deque<ObjectId> arrivals_;  ///< added, not asked yet whether they came from afar
   std::uint64_t next_event_ = 1;
   std::vector<Look> looks_;        ///< a frame uses the first ones; memory is kept between frames
   std::vector<ObjectId> changed_;  ///< since the last result

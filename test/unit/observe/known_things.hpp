@@ -18,7 +18,8 @@ class KnownThings {
     object.confirmed = true;
     object.arrival = Arrival::kFound;
     for (int i = 0; i < frames; ++i) {
-      const Segmented s = segmented(room_with({thing}), swaying_camera(static_cast<std::uint64_t>(3 * i)));
+      const Segmented s =
+          segmented(room_with({thing}), swaying_camera(static_cast<std::uint64_t>(3 * i)));
       for (const Observation& o : s.observations.list) {
         if (o.class_id == thing.class_id) object.model.fuse(o.points, i + 1);
       }
@@ -43,8 +44,7 @@ class KnownThings {
     for (const auto& [id, object] : library.all()) {
       looks.emplace_back();
       looks.back().object = object.get();
-      judge(now.cloud, field, now.observations, sight(), config.depth_noise, config.association,
-            looks.back());
+      judge(now.cloud, field, now.observations, sight(), config.depth_noise, looks.back());
     }
     for (Look& l : looks) {
       align(now.cloud, field, now.observations, sight(), config.depth_noise, config.association,

@@ -61,8 +61,8 @@ TEST(Align, TheSignTellsNearerFromFarther) {
   for (const double step_m : {-0.2, 0.2}) {
     KnownThings known;
     known.learn(solid(kBoxClass, {0.0, 2.3}, {0.6, 0.4, 0.6}, 0.3));
-    const Look& look =
-        known.look_at_only(room_with({solid(kBoxClass, {0.0, 2.3 + step_m}, {0.6, 0.4, 0.6}, 0.3)}));
+    const Look& look = known.look_at_only(
+        room_with({solid(kBoxClass, {0.0, 2.3 + step_m}, {0.6, 0.4, 0.6}, 0.3)}));
     ASSERT_EQ(look.verdict, Verdict::kDisplaced) << step_m;
     EXPECT_EQ(look.sign, step_m < 0.0 ? 1 : -1);
     EXPECT_NEAR(look.displacement_m, 0.2, 0.05);
@@ -138,8 +138,9 @@ TEST(Align, AStillThingIsNeverDisplaced) {
     known.seed = seed;
     const Eigen::Vector3d size(random.uniform(0.3, 1.2), random.uniform(0.1, 0.5),
                                random.uniform(0.4, 1.0));
-    const SceneObject thing = solid(kBoxClass, {random.uniform(-0.2, 0.2), random.uniform(2.1, 2.6)},
-                                    size, random.uniform(-0.8, 0.8));
+    const SceneObject thing =
+        solid(kBoxClass, {random.uniform(-0.2, 0.2), random.uniform(2.1, 2.6)}, size,
+              random.uniform(-0.8, 0.8));
     known.learn(thing);
     for (int i = 0; i < 12; ++i) {
       std::vector<SceneObject> things{thing};
@@ -152,14 +153,14 @@ TEST(Align, AStillThingIsNeverDisplaced) {
       Frame frame = test::shoot(room_with(things), eye, static_cast<std::uint64_t>(i));
       test::add_noise(frame, known.config.depth_noise, seed);
       for (int d = 0; d < 3; ++d) frame.T_W_C.translation()[d] += random.uniform(-0.02, 0.02);
-      frame.T_W_C.rotate(Eigen::AngleAxisd(random.uniform(-0.005, 0.005), Eigen::Vector3d::UnitY()));
+      frame.T_W_C.rotate(
+          Eigen::AngleAxisd(random.uniform(-0.005, 0.005), Eigen::Vector3d::UnitY()));
       const test::Segmented s = test::segment(frame, known.config);
       DepthField field;
       field.update(s.cloud);
       Look look;
       look.object = known.library.all().begin()->second.get();
-      judge(s.cloud, field, s.observations, known.sight(), known.config.depth_noise,
-            known.config.association, look);
+      judge(s.cloud, field, s.observations, known.sight(), known.config.depth_noise, look);
       align(s.cloud, field, s.observations, known.sight(), known.config.depth_noise,
             known.config.association, known.least_m(), &look, 1, look);
       ASSERT_NE(look.verdict, Verdict::kDisplaced)

@@ -144,8 +144,7 @@ TEST_F(FreeSpaceTest, SurfacesOfStillThingsAreNeverSeenEmpty) {
         Eigen::Vector3d p = centers[k];
         p.head<2>() += turn * at.head<2>();
         p.z() += at.z();
-        ASSERT_FALSE(free_.seen_empty(p.cast<float>()))
-            << "seed " << seed << ": " << p.transpose();
+        ASSERT_FALSE(free_.seen_empty(p.cast<float>())) << "seed " << seed << ": " << p.transpose();
         ++asked;
       }
     }

@@ -9,8 +9,8 @@ namespace {
 
 using test::kBoxClass;
 using test::kCageClass;
-using test::kPersonClass;
 using test::KnownThings;
+using test::kPersonClass;
 using test::room_with;
 using test::solid;
 
@@ -96,8 +96,7 @@ TEST(Judge, HolesSayNothing) {
   field.update(s.cloud);
   Look look;
   look.object = &object;
-  judge(s.cloud, field, s.observations, known.sight(), known.config.depth_noise,
-        known.config.association, look);
+  judge(s.cloud, field, s.observations, known.sight(), known.config.depth_noise, look);
   EXPECT_EQ(look.verdict, Verdict::kTooLittleSeen);
   EXPECT_FALSE(look.contested);
 }

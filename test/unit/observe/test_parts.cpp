@@ -232,7 +232,8 @@ TEST_F(Divide, NoPointHasTwoOwners) {
     observations_ = {};
     count_ = 0;
     const auto any_face = [&] {
-      const auto x = static_cast<float>(random.uniform(-1, 1)), z = static_cast<float>(random.uniform(0, 0.5));
+      const auto x = static_cast<float>(random.uniform(-1, 1)),
+                 z = static_cast<float>(random.uniform(0, 0.5));
       return face(x, x + static_cast<float>(random.uniform(0.2, 1)), z,
                   z + static_cast<float>(random.uniform(0.2, 0.8)),
                   2.0f + 0.1f * static_cast<float>(random.below(3)));
@@ -248,8 +249,8 @@ TEST_F(Divide, NoPointHasTwoOwners) {
       see(any_face() + any_face(), static_cast<std::uint16_t>(random.below(2) * (5 + k)));
     }
     std::set<std::pair<std::int32_t, std::int32_t>> owned;
-    for (const Part& part : divided(
-             [](const Eigen::Vector3f& p) { return std::fmod(p.x() + 10.0f, 0.7f) < 0.35f; })) {
+    for (const Part& part :
+         divided([](const Eigen::Vector3f& p) { return std::fmod(p.x() + 10.0f, 0.7f) < 0.35f; })) {
       const Observation& o = observations_.list.at(part.observation);
       ASSERT_EQ(part.points.size(), part.indices.size());
       ASSERT_FALSE(part.points.empty());

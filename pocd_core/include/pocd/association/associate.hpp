@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pocd/association/association_config.hpp"
+#include "pocd/association/icp_target.hpp"
 #include "pocd/association/visibility.hpp"
 #include "pocd/map/object_library.hpp"
 
@@ -21,9 +22,13 @@ struct Match {
   int sign = 1;
 };
 
+/// Surfels as the prepared side of an alignment, see IcpTarget.
+IcpTarget icp_target(const std::vector<Surfel>& surfels, double inlier_distance_m,
+                     double max_correspondence_m);
+
 /// How an object that is still about where it was may have moved: point-to-plane ICP from `start`
-/// (takes the observation to the object), which moves it along no direction that its surface leaves open. Nothing when it does not
-/// fit.
+/// (takes the observation to the object), which moves it along no direction that its surface leaves
+/// open. Nothing when it does not fit.
 std::optional<Match> align_in_place(LibraryObject& object, const Observation& observation,
                                     const Pose& T_W_C, const Pose& start,
                                     const AssociationConfig& config);

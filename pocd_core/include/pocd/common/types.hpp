@@ -1,6 +1,7 @@
 // Identifiers, stamps and labels: strong where mixing them up would compile.
 #pragma once
 
+#include <cmath>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
@@ -37,5 +38,14 @@ struct OrientedBox {
   Pose4 pose;
   Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
 };
+
+/// Length of the box's longer horizontal side [m].
+inline double longest_side(const OrientedBox& box) { return box.size_m.head<2>().maxCoeff(); }
+
+/// Direction of that side, a unit vector [W].
+inline Eigen::Vector3d long_axis(const OrientedBox& box) {
+  const double yaw_rad = box.pose.yaw_rad + (box.size_m.x() < box.size_m.y() ? M_PI_2 : 0.0);
+  return {std::cos(yaw_rad), std::sin(yaw_rad), 0.0};
+}
 
 }  // namespace pocd

@@ -44,8 +44,7 @@ bool is_inside(const OrientedBox& box, double margin_m, const Eigen::Vector3f& p
 
 /// Fills `look` from its object's surface, except for the alignment.
 void judge(const OrganizedCloud& cloud, const DepthField& field, const Observations& observations,
-           const SightConfig& sight, const DepthNoise& noise, const AssociationConfig& config,
-           Look& look);
+           const SightConfig& sight, const DepthNoise& noise, Look& look);
 
 /// For an object whose place is contested: aligns what was measured around it with its surface
 /// (point-to-plane ICP). When the surface, moved so, explains the frame, the verdict becomes

@@ -21,4 +21,7 @@ Evidence apply_measurement(LibraryObject& object, double delta_m, double sigma_m
 Belief next_belief(const Belief& before, const Measurement& measurement, const StateConfig& state,
                    const ChangeConfig& change);
 
+/// Sets alpha and beta to those of a new object; mu and sigma stay.
+void forget_evidence(Belief& belief, const StateConfig& state);
+
 }  // namespace pocd

@@ -1,0 +1,180 @@
+// ObjectTracker: which objects are one thing, and how they are joined.
+#include <algorithm>
+#include <cmath>
+
+#include "tracker_step.hpp"
+
+namespace pocd {
+namespace {
+
+/// Two objects are seen in one piece when this many points of each are measured on it.
+constexpr int kSharedPoints = 10;
+/// Share of a found object that lies within another one's box when it is another side of it.
+constexpr double kInsideShare = 0.6;
+/// From this share on it is, whether it was found or arrived: no other thing stands within a thing.
+constexpr double kWithinShare = 0.9;
+/// Two objects are one when this share of the smaller one lies on the other.
+constexpr double kSameShare = 0.5;
+
+}  // namespace
+
+bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) const {
+  // Two things that moved, each as a whole, are two; what arrived is no side of what stood there.
+  if (a.moved && b.moved) return false;
+  const bool a_arrived = a.arrival == Arrival::kArrived, b_arrived = b.arrival == Arrival::kArrived;
+  return a_arrived == b_arrived;
+}
+
+bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) const {
+  const bool a_less = a.model.surfels().size() < b.model.surfels().size();
+  const LibraryObject& small = a_less ? a : b;
+  const LibraryObject& large = a_less ? b : a;
+  const auto reach = static_cast<float>(
+      std::max(config_.segmentation.cluster_tolerance_m, 2.0 * config_.map.voxel_size_m));
+  int contacts = 0, checked = 0;
+  for (const Surfel& s : small.model.surfels()) {
+    if (s.hits < 2 || s.seen_through > 0) continue;
+    ++checked;
+    const int other = large.model.nearest(s.point_W, reach);
+    contacts += other != ObjectModel::kNone && large.model.surfels()[other].seen_through == 0;
+  }
+  // A seam, not a spot: about the square root of the smaller surface's size.
+  return contacts >= std::max(3.0, 0.5 * std::sqrt(static_cast<double>(checked)));
+}
+
+bool ObjectTracker::coincide(const LibraryObject& a, const LibraryObject& b) const {
+  const bool a_less = a.model.surfels().size() < b.model.surfels().size();
+  const LibraryObject& small = a_less ? a : b;
+  const LibraryObject& large = a_less ? b : a;
+  if (box_overlap(a.box, b.box, 2.0 * config_.map.voxel_size_m) < kSameShare) return false;
+  const auto reach = static_cast<float>(1.5 * config_.map.voxel_size_m);
+  const std::size_t step = std::max<std::size_t>(1, small.model.surfels().size() / 100);
+  std::size_t asked = 0, same = 0;
+  for (std::size_t i = 0; i < small.model.surfels().size(); i += step) {
+    ++asked;
+    same += large.model.nearest(small.model.surfels()[i].point_W, reach) != ObjectModel::kNone;
+  }
+  return static_cast<double>(same) >= kSameShare * static_cast<double>(asked);
+}
+
+void ObjectTracker::join_objects(Step& step) {
+  const int enough = config_.state.merge_frames;
+  std::vector<std::pair<ObjectId, ObjectId>> joined;
+  for (std::size_t a = 0; a < step.look_count; ++a) {
+    Look& look_a = looks_[a];
+    if (look_a.verdict != Verdict::kInPlace || look_a.contested) continue;
+    for (std::size_t b = a + 1; b < step.look_count; ++b) {
+      Look& look_b = looks_[b];
+      LibraryObject &x = *look_a.object, &y = *look_b.object;
+      if (look_b.verdict != Verdict::kInPlace || look_b.contested || x.class_id != y.class_id ||
+          (!may_be_one(x, y) && !coincide(x, y))) {
+        continue;
+      }
+      bool one_piece = false, apart = false;
+      for (const auto& t : look_a.sighting.touches) {
+        if (t.hit < kSharedPoints) continue;
+        for (const auto& u : look_b.sighting.touches) {
+          if (u.hit < kSharedPoints) continue;
+          one_piece |= t.observation == u.observation;
+          apart |= t.observation != u.observation &&
+                   step.observations.list[t.observation].instance != 0 &&
+                   step.observations.list[u.observation].instance != 0;
+        }
+      }
+      const auto count = x.companions.find(y.id);
+      if (!one_piece || apart) {
+        // Once seen as two, they have to be seen as one for as long again.
+        const bool both =
+            look_a.sighting.hit >= kSharedPoints && look_b.sighting.hit >= kSharedPoints;
+        if (both && count != x.companions.end() && --count->second <= 0) x.companions.erase(count);
+        continue;
+      }
+      if (coincide(x, y)) {
+        joined.emplace_back(x.id, y.id);
+        continue;
+      }
+      int& looks = x.companions[y.id];
+      if (++looks < enough) continue;
+      looks = 0;
+      if (connected(x, y)) joined.emplace_back(x.id, y.id);
+    }
+  }
+  for (const auto& [a, b] : joined) {
+    LibraryObject *survivor = library_.find(a), *absorbed = library_.find(b);
+    if (!survivor || !absorbed) continue;
+    // What is known outside goes on; of two such, the older one.
+    if (absorbed->confirmed && !survivor->confirmed) std::swap(survivor, absorbed);
+    absorb(step, *survivor, *absorbed);
+  }
+}
+
+void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed) {
+  const ObjectId absorbed_id = absorbed.id;
+  const bool was_known = absorbed.confirmed;
+  survivor.model.absorb(absorbed.model);
+  survivor.icp_target.reset();
+  survivor.most_surfels = std::max(survivor.most_surfels, survivor.model.surfels().size());
+  // Both were seen in the same looks, for the most part.
+  survivor.observations = std::max(survivor.observations, absorbed.observations);
+  survivor.seen_by.insert(absorbed.seen_by.begin(), absorbed.seen_by.end());
+  survivor.in_place_ns = std::max(survivor.in_place_ns, absorbed.in_place_ns);
+  survivor.last_seen_ns = std::max(survivor.last_seen_ns, absorbed.last_seen_ns);
+  survivor.companions.clear();
+  mark_changed(survivor);
+  step.map.reassign_object(absorbed_id, survivor.id);
+  std::replace(step.owners.begin(), step.owners.end(), absorbed_id, survivor.id);
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (looks_[n].object != &absorbed) continue;
+    looks_[n].object = &survivor;
+    looks_[n].sighting.sights.clear();  // of surfels that are listed elsewhere now
+  }
+  library_.erase(absorbed_id);
+  refit_box(step, survivor);
+  if (!was_known) return;
+  step.result.retired.push_back(absorbed_id);
+  add_event(step, EventKind::kUpdated, survivor, "joined_" + std::to_string(to_index(absorbed_id)))
+      .absorbed = absorbed_id;
+  survivor.reported_box = survivor.box;
+}
+
+bool ObjectTracker::seen_apart(const Step& step, ObjectId a, ObjectId b) const {
+  const auto instance_of = [&](std::size_t p) {
+    return step.observations.list[step.parts[p].observation].instance;
+  };
+  for (std::size_t p = 0; p < step.parts.size(); ++p) {
+    if (step.owners[p] != a || instance_of(p) == 0) continue;
+    for (std::size_t q = 0; q < step.parts.size(); ++q) {
+      if (step.owners[q] == b && instance_of(q) != 0 && instance_of(q) != instance_of(p))
+        return true;
+    }
+  }
+  return false;
+}
+
+LibraryObject* ObjectTracker::whole_of(const Step& step, const LibraryObject& found) {
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  const bool arrived = found.arrival == Arrival::kArrived;
+  const double margin_m = 2.0 * config_.map.voxel_size_m;
+  for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
+    LibraryObject* other = library_.find(id);
+    if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
+        other->looks_unobserved > 0 || seen_apart(step, found.id, id)) {
+      continue;
+    }
+    if (coincide(found, *other)) return other;
+    std::size_t inside = 0;
+    for (const Surfel& s : found.model.surfels())
+      inside += is_inside(other->box, margin_m, s.point_W);
+    const double share =
+        static_cast<double>(inside) / static_cast<double>(found.model.surfels().size());
+    if (share >= kWithinShare) return other;
+    // What arrived is a side of what arrived lately; what was found, of what stands longer, too.
+    const bool other_arrived = other->arrival == Arrival::kArrived;
+    const bool lately = other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns;
+    if (arrived && !(other_arrived && lately)) continue;
+    if (connected(found, *other) || share >= kInsideShare) return other;
+  }
+  return nullptr;
+}
+
+}  // namespace pocd
