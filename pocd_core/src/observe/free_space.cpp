@@ -23,6 +23,18 @@ bool FreeSpace::seen_empty(const Eigen::Vector3f& point_W) const {
   return it != blocks_.end() && (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] >= kLooks;
 }
 
+void FreeSpace::forget_behind(const Eigen::Vector3f& eye_W, const Eigen::Vector3f& surface_W,
+                              double depth_m) {
+  const Eigen::Vector3f along = (surface_W - eye_W).normalized();
+  for (double at = 0.0; at <= depth_m; at += 0.5 * cell_m_) {
+    const Eigen::Vector3f p = surface_W + static_cast<float>(at) * along;
+    const int x = floor_div(p.x(), cell_m_), y = floor_div(p.y(), cell_m_),
+              z = floor_div(p.z(), cell_m_);
+    const auto it = blocks_.find({x >> 3, y >> 3, z >> 3});
+    if (it != blocks_.end()) (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] = 0;
+  }
+}
+
 void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
                        const DepthNoise& noise, double max_depth_m, double pose_tolerance_m) {
   const CameraModel& camera = cloud.camera;

@@ -10,6 +10,16 @@ const std::deque<Departure>& Departures::recent(StampNs now_ns, double window_s)
   return list_;
 }
 
+const std::deque<Move>& Departures::recent_moves(StampNs now_ns, double window_s) {
+  const auto window_ns = static_cast<StampNs>(window_s * 1e9);
+  while (!moves_.empty() && now_ns - moves_.front().moved_ns > window_ns) moves_.pop_front();
+  return moves_;
+}
+
+bool Departures::has(ObjectId id) const {
+  return std::any_of(list_.begin(), list_.end(), [&](const Departure& d) { return d.id == id; });
+}
+
 void Departures::forget(ObjectId id) {
   list_.erase(
       std::remove_if(list_.begin(), list_.end(), [&](const Departure& d) { return d.id == id; }),
@@ -23,6 +33,10 @@ void Departures::set_asked_far(ObjectId id) {
 void Departures::set_clock_back(StampNs latest_ns) {
   for (Departure& d : list_) {
     for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.departed_ns})
+      *stamp_ns = std::min(*stamp_ns, latest_ns);
+  }
+  for (Move& m : moves_) {
+    for (StampNs* stamp_ns : {&m.in_place_ns, &m.moved_ns})
       *stamp_ns = std::min(*stamp_ns, latest_ns);
   }
 }

@@ -25,10 +25,16 @@ constexpr double kNearShare = 1.0;
 constexpr double kAtOnceShare = 1.0;
 /// A longer one is told after this time: another origin may be nearer [s].
 constexpr double kFarWaitS = 1.0;
-/// Share of the surface that a motion must explain more when it is longer by the thing's length.
-constexpr double kShortness = 0.5;
+/// Motions that agree with this much less of what is known explain it as well; when they put the
+/// thing's middle elsewhere by more than this share of its length, nothing is known of where it is.
+constexpr double kSameFit = 0.03;
+constexpr double kSlideShare = 0.25;
 /// Points of the new surface that are aligned.
 constexpr std::size_t kAlignPoints = 600;
+/// Of all motions that put the boxes on each other, so many are aligned: those that bring most of
+/// so many points near the old surface.
+constexpr std::size_t kStarts = 16;
+constexpr std::size_t kStartPoints = 60;
 
 /// The new one is no larger than the old one, and stands as high.
 bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) {
@@ -41,10 +47,65 @@ bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) 
   return f[0] <= room(k[0]) && f[1] <= room(k[0]) && f[2] <= room(k[2]) && k[2] <= room(f[2]);
 }
 
+/// Motions from `found` to `known` that put their boxes' sides on each other, the likeliest ones
+/// first: with the heading that it has and with the sides along each other; by the middles and by
+/// the sides, since of each only a part may be known.
+std::vector<Pose> likely_starts(const OrientedBox& known, const OrientedBox& found,
+                                const IcpTarget& target, const Points& source) {
+  const Eigen::Vector3d origin_W = target.origin_W();
+  const std::size_t step = std::max<std::size_t>(1, source.size() / kStartPoints);
+  std::vector<std::pair<int, Pose>> starts;
+  const auto add = [&](const Pose& start) {
+    int on = 0;
+    for (std::size_t i = 0; i < source.size(); i += step) {
+      const Eigen::Vector3d p = start * source[i].cast<double>();
+      on += target.nearest((p - origin_W).cast<float>()).has_value();
+    }
+    starts.emplace_back(on, start);
+  };
+  add(Pose::Identity());
+  const Eigen::AngleAxisd heading(known.pose.yaw_rad, Eigen::Vector3d::UnitZ());
+  for (int quarter = -1; quarter < 4; ++quarter) {
+    const double turn_rad =
+        quarter < 0 ? 0.0 : known.pose.yaw_rad - found.pose.yaw_rad + quarter * M_PI / 2.0;
+    Pose start = Pose::Identity();
+    start.linear() =
+        Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    // Sides of the found box, turned, along those of the known one.
+    const double off_rad = found.pose.yaw_rad + turn_rad - known.pose.yaw_rad;
+    const double c = std::abs(std::cos(off_rad)), s = std::abs(std::sin(off_rad));
+    const double play_x = 0.5 * (known.size_m.x() - c * found.size_m.x() - s * found.size_m.y());
+    const double play_y = 0.5 * (known.size_m.y() - s * found.size_m.x() - c * found.size_m.y());
+    for (int x = -1; x <= 1; ++x) {
+      for (int y = -1; y <= 1; ++y) {
+        start.translation() = known.pose.position_W +
+                              heading * Eigen::Vector3d(x * play_x, y * play_y, 0.0) -
+                              start.linear() * found.pose.position_W;
+        add(start);
+      }
+    }
+  }
+  std::stable_sort(starts.begin(), starts.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<Pose> likely;
+  for (const auto& [on, start] : starts) {
+    if (likely.size() < kStarts) likely.push_back(start);
+  }
+  return likely;
+}
+
 }  // namespace
 
+bool ObjectTracker::may_tell(const Motion& motion, const Departure& departure,
+                             const LibraryObject& found, StampNs now_ns) const {
+  // What came from farther away is told once nearer origins had time to show.
+  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  return motion.lengths <= kAtOnceShare || (now_ns - departure.departed_ns >= wait_ns &&
+                                            now_ns - found.first_seen_ns >= wait_ns);
+}
+
 std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
-                                               const LibraryObject& found, StampNs now_ns) const {
+                                               const LibraryObject& found) const {
   if (departure.class_id != found.class_id || departure.id == found.id) return std::nullopt;
   // What was seen in its place when the new one was there, too, is another thing.
   if (departure.in_place_ns > found.first_seen_ns) return std::nullopt;
@@ -67,32 +128,9 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   IcpOptions options;
   options.max_iterations = config_.association.icp_iterations;
   options.robust_scale_m = config_.map.voxel_size_m;
-  // With the heading that it has, and with the boxes' sides along each other. By the middles, and
-  // by either end, since of each only a part may be known.
-  std::vector<Pose> starts{Pose::Identity()};
-  const double turn_rad = departure.box.pose.yaw_rad - found.box.pose.yaw_rad;
-  const Eigen::Vector3d along_W = long_axis(departure.box);
-  const double play_m = 0.5 * (longest_side(departure.box) - longest_side(found.box));
-  for (int quarter = -1; quarter < 4; ++quarter) {
-    Pose start = Pose::Identity();
-    if (quarter >= 0) {
-      start.linear() = Eigen::AngleAxisd(turn_rad + quarter * M_PI / 2.0, Eigen::Vector3d::UnitZ())
-                           .toRotationMatrix();
-    }
-    for (const double slid_m : {0.0, play_m, -play_m}) {
-      if (slid_m != 0.0 && std::abs(play_m) < inlier_m) continue;
-      start.translation() = departure.box.pose.position_W + slid_m * along_W -
-                            start.linear() * found.box.pose.position_W;
-      starts.push_back(start);
-    }
-  }
-  // What may have come from farther away is told once nearer origins had time to show.
-  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
-  const bool settled =
-      now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns;
-  std::optional<Motion> best;
-  double best_score = 0.0;
-  bool enough = false;
+  const std::vector<Pose> starts = likely_starts(departure.box, found.box, target, source);
+  std::vector<Motion> explanations;
+  const auto all = static_cast<double>(departure.surfels.size());
   for (const Pose& start : starts) {
     const IcpResult icp = point_to_plane_icp(target, source, options, start);
     if (icp.dissimilarity > kUnseenShare) continue;
@@ -102,12 +140,11 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
       const Eigen::Vector3d p = s.point_W.cast<double>();
       moved_m += (T_new_old * p - p).norm();
     }
-    moved_m /= static_cast<double>(departure.surfels.size());
+    moved_m /= all;
     if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
       continue;
     const double lengths = moved_m / longest_side(departure.box);
     if (lengths > kNearShare && found.arrival != Arrival::kArrived) continue;
-    if (lengths > kAtOnceShare && !settled) continue;
     const Eigen::Isometry3f T = T_new_old.cast<float>();
     std::size_t empty = 0, seen = 0;
     for (const Surfel& s : departure.surfels) {
@@ -118,21 +155,31 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
         ++empty;
       }
     }
-    const auto all = static_cast<double>(departure.surfels.size());
-    if (static_cast<double>(empty) > kEmptyShare * static_cast<double>(seen + empty)) continue;
+    const double contradicted =
+        static_cast<double>(empty) / std::max(1.0, static_cast<double>(seen + empty));
+    if (contradicted > kEmptyShare) continue;
     // New sides may show when all of the known ones do.
-    if (icp.dissimilarity > kOutlierShare && static_cast<double>(seen) < kWholeShare * all)
-      continue;
-    // Of motions that explain the same, the shortest: the sides of a box are alike.
-    const double contradicted = static_cast<double>(empty) / static_cast<double>(seen + empty);
-    const double score = 1.0 - icp.dissimilarity - contradicted - kShortness * lengths;
-    if (best && score <= best_score) continue;
-    best_score = score;
-    best = Motion{T_new_old, moved_m};
-    enough = static_cast<double>(seen) >= kSeenShare * all;
+    const double seen_share = static_cast<double>(seen) / all;
+    if (icp.dissimilarity > kOutlierShare && seen_share < kWholeShare) continue;
+    explanations.push_back(
+        {T_new_old, 1.0 - icp.dissimilarity - contradicted, seen_share, lengths});
   }
-  // The best one must be seen well enough; a worse one is no answer until then.
-  return enough ? best : std::nullopt;
+  const auto best = std::max_element(
+      explanations.begin(), explanations.end(),
+      [](const Motion& a, const Motion& b) { return a.likelihood() < b.likelihood(); });
+  // It must be seen well enough; a worse one is no answer until then.
+  if (best == explanations.end() || best->seen < kSeenShare) return std::nullopt;
+  if (best->seen >= kWholeShare) return *best;
+  // Of a small part of a flat face nobody can tell how far it slid.
+  const auto centre_of = [&](const Motion& motion) -> Eigen::Vector3d {
+    return motion.T_new_old * departure.box.pose.position_W;
+  };
+  for (const Motion& other : explanations) {
+    if (other.fit > best->fit - kSameFit &&
+        (centre_of(other) - centre_of(*best)).norm() > kSlideShare * longest_side(departure.box))
+      return std::nullopt;
+  }
+  return *best;
 }
 
 bool ObjectTracker::origin_in_doubt(const LibraryObject& object) {
@@ -159,15 +206,24 @@ LibraryObject* ObjectTracker::find_departed(const Step& step, const Departure& d
     const bool open = other->confirmed ? other->added_ns && now_ns - *other->added_ns <= window_ns
                                        : other->observations >= 2;
     if (!open || other->id == departure.part_of) continue;
-    const auto m = motion_of(departure, *other, now_ns);
-    if (!m || (best && m->length_m >= motion.length_m)) continue;
+    const auto m = motion_of(departure, *other);
+    if (!m || (best && m->likelihood() <= motion.likelihood())) continue;
     best = other, motion = *m;
   }
-  return best;
+  return best && may_tell(motion, departure, *best, now_ns) ? best : nullptr;
 }
 
 void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
   departure.evidence.rule = rule;
+  const auto moves =
+      departures_.recent_moves(step.frame.stamp_ns, config_.state.relocation_window_s);
+  for (auto move = moves.rbegin(); move != moves.rend(); ++move) {
+    const Along along = went_along(step, departure, *move);
+    if (along == Along::kNo) continue;
+    if (along == Along::kJoined && departure.part_of == ObjectId::kNone)
+      step.result.retired.push_back(departure.id);
+    return;
+  }
   Motion motion;
   if (LibraryObject* found = find_departed(step, departure, motion)) {
     report_move(step, *found, departure, motion.T_new_old, rule);
@@ -193,11 +249,11 @@ bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
   Motion motion;
   for (const Departure& d :
        departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
-    const auto m = motion_of(d, object, step.frame.stamp_ns);
-    if (!m || (best && m->length_m >= motion.length_m)) continue;
+    const auto m = motion_of(d, object);
+    if (!m || (best && m->likelihood() <= motion.likelihood())) continue;
     best = &d, motion = *m;
   }
-  if (!best) return false;
+  if (!best || !may_tell(motion, *best, object, step.frame.stamp_ns)) return false;
   const Departure from = *best;
   report_move(step, object, from, motion.T_new_old, "found_again");
   return true;
@@ -232,6 +288,7 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   object.lost = 0;
   object.added_ns = step.frame.stamp_ns;
   arrivals_.push_back(object.id);
+  hide_space_behind(step, object, 0);
   mark_changed(object);
   add_event(step, EventKind::kAdded, object, to_string(object.arrival));
 }
@@ -257,6 +314,7 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
     s.seen_through = 0;
     if (!seen_empty(step.map, s.point_W)) sides.push_back(s);
   }
+  hide_space_behind(step, found, 0);
   found.model.add(sides);
   found.icp_target.reset();
   found.most_surfels = found.model.surfels().size();
@@ -266,11 +324,18 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   found.confirmed = true;
   found.arrival = Arrival::kArrived;
   found.moved = true;
+  found.placed_ns = step.frame.stamp_ns;
   found.added_ns.reset();
   found.reported_box = found.box;
   found.lost = 0;
   found.changed = false;  // it was listed under its old id
   mark_changed(found);
+  Move move;
+  move.id = found.id;
+  move.class_id = found.class_id;
+  move.T_new_old = T_new_old;
+  move.in_place_ns = from.in_place_ns;
+  move.moved_ns = step.frame.stamp_ns;
   ObjectEvent& event = add_event(step, EventKind::kMoved, found, rule);
   // Where all that is known of it was; of what departed, only a part may have been known.
   OrientedBox before = found.box;
@@ -281,6 +346,9 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   event.absorbed = absorbed;
   event.evidence = from.evidence;
   event.evidence.rule = rule;
+  move.from = before;
+  departures_.add_move(move);
+  gather_sides(step, move);
 }
 
 }  // namespace pocd

@@ -178,6 +178,7 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
                    hits.end());
   departure.in_place_ns = hits[hits.size() / 2];
   departure.departed_ns = step.frame.stamp_ns;
+  departure.arrival = object.arrival;
   departure.seen_by = object.seen_by;
   departure.evidence = evidence_of(step, object);
   if (object.belief.stationarity() < config_.state.remove_below) {
@@ -286,6 +287,7 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string&
   departure.first_seen_ns = object.first_seen_ns;
   departure.in_place_ns = object.in_place_ns;
   departure.departed_ns = step.frame.stamp_ns;
+  departure.arrival = object.arrival;
   departure.seen_by = object.seen_by;
   departure.evidence = evidence_of(step, object);
   const bool was_known = object.confirmed;
@@ -333,15 +335,17 @@ void ObjectTracker::report_changes(Step& step) {
   std::sort(changed_.begin(), changed_.end());
   changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
   const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
-  std::vector<LibraryObject*> touched;
+  std::vector<ObjectId> touched;
   for (const ObjectId id : changed_) {
     LibraryObject* object = library_.find(id);  // null when removed since
     if (!object) continue;
     object->changed = false;
-    if (object->confirmed) touched.push_back(object);
+    if (object->confirmed) touched.push_back(id);
   }
   changed_.clear();
-  for (LibraryObject* object : touched) {
+  for (const ObjectId id : touched) {
+    LibraryObject* object = library_.find(id);
+    if (!object) continue;  // joined with one that moved
     const double shift_m =
         (object->box.pose.position_W - object->reported_box.pose.position_W).norm();
     const double growth_m =
@@ -353,8 +357,17 @@ void ObjectTracker::report_changes(Step& step) {
     object->reported_box = object->box;
     object->lost = 0;
   }
-  for (const LibraryObject* object : touched)
+  // Those above, and what was found out about others meanwhile.
+  touched.insert(touched.end(), changed_.begin(), changed_.end());
+  changed_.clear();
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  for (const ObjectId id : touched) {
+    LibraryObject* object = library_.find(id);
+    if (!object || !object->confirmed) continue;
+    object->changed = false;
     step.result.changed_objects.push_back(snapshot(*object));
+  }
   std::sort(step.result.retired.begin(), step.result.retired.end());
 }
 

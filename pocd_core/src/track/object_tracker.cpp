@@ -81,6 +81,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
   Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}};
   step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m, config_.map.max_depth_m,
                 config_.association.icp_max_distance_m};
+  join_sides(step);
   look_at_objects(step);
   update_beliefs(step);
   fuse_parts(step);
@@ -100,6 +101,9 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
   for (const auto& [id, object] : library_.all()) {
     bound(object->first_seen_ns);
     bound(object->last_seen_ns);
+    bound(object->in_reach_ns);
+    bound(object->visit_ns);
+    bound(object->placed_ns);
     bound(object->in_place_ns);
     bound(object->unobserved_since_ns);
     if (object->added_ns) bound(*object->added_ns);
@@ -168,6 +172,8 @@ void ObjectTracker::update_beliefs(Step& step) {
 void ObjectTracker::move_displaced(Step& step, Look& look) {
   LibraryObject& object = *look.object;
   const OrientedBox previous_box = object.box;
+  const Move move{object.id,          object.class_id,    previous_box,
+                  look.T_new_old, object.in_place_ns, step.frame.stamp_ns};
   object.looks_displaced = 0;
   object.model.transform(look.T_new_old);
   for (Surfel& s : object.model.surfels()) s.seen_through = 0;
@@ -185,9 +191,11 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   object.added_ns.reset();
   object.arrival = Arrival::kArrived;
   object.moved = true;
+  object.placed_ns = step.frame.stamp_ns;
   add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
   object.reported_box = object.box;
   object.lost = 0;
+  departures_.add_move(move);
 }
 
 Moment& ObjectTracker::moment_of(Step& step, LibraryObject& object) {
@@ -268,7 +276,9 @@ void ObjectTracker::fuse_parts(Step& step) {
 
 void ObjectTracker::fuse(Step& step, LibraryObject& object,
                          const std::vector<SurfacePoint>& points) {
+  const std::size_t known = object.model.surfels().size();
   object.model.fuse(points, step.frame.stamp_ns);
+  if (object.confirmed) hide_space_behind(step, object, known);
   object.icp_target.reset();
   Moment& moment = moment_of(step, object);
   if (!std::exchange(moment.observed, true)) ++object.observations;
@@ -278,6 +288,15 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object,
   mark_changed(object);
 }
 
+void ObjectTracker::hide_space_behind(Step& step, const LibraryObject& object, std::size_t from) {
+  const Eigen::Vector3f eye_W = step.cloud.T_W_C.translation().cast<float>();
+  const auto& surfels = object.model.surfels();
+  for (std::size_t i = from; i < surfels.size(); ++i) {
+    if (surfels[i].arrived)
+      free_space_.forget_behind(eye_W, surfels[i].point_W, longest_side(object.box));
+  }
+}
+
 LibraryObject& ObjectTracker::create(Step& step, ClassId class_id) {
   LibraryObject& object = library_.create(config_.map.voxel_size_m);
   object.class_id = class_id;
@@ -285,7 +304,8 @@ LibraryObject& ObjectTracker::create(Step& step, ClassId class_id) {
   object.belief.sigma = config_.state.initial_sigma_m;
   forget_evidence(object.belief, config_.state);
   object.first_seen_ns = step.frame.stamp_ns;
-  object.in_place_ns = step.frame.stamp_ns;
+  object.in_reach_ns = object.visit_ns = object.placed_ns = object.in_place_ns =
+      step.frame.stamp_ns;
   // Another view of this moment tells nothing of what the object does between two moments.
   Moment& moment = moment_of(step, object);
   moment.measured = true;

@@ -43,6 +43,7 @@ class ObjectTracker {
   struct Step;  ///< what the parts of one update share
 
   // In the order of update().
+  void join_sides(Step& step);
   void look_at_objects(Step& step);
   void update_beliefs(Step& step);
   void fuse_parts(Step& step);
@@ -61,18 +62,26 @@ class ObjectTracker {
   void move_displaced(Step& step, Look& look);
   void fuse(Step& step, LibraryObject& object, const std::vector<SurfacePoint>& points);
   LibraryObject& create(Step& step, ClassId class_id);
+  /// What was known of the space behind the object, from its surfel `from` on, is known no more.
+  void hide_space_behind(Step& step, const LibraryObject& object, std::size_t from);
   void refit_box(Step& step, LibraryObject& object);
   void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
   /// Whether what is known of two objects allows that they are one.
   bool may_be_one(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects of one piece in the image are one piece of surface in the map.
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether two objects may be sides of one body: nothing was ever seen through between them, and
+  /// they are no farther apart than the larger one is long.
+  bool sides_of_one(Step& step, const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether `known` stood in its place for long enough before `found` was first seen that the free
+  /// space around it is known.
+  bool surroundings_known(const LibraryObject& found, const LibraryObject& known) const;
   /// Whether two objects are one surface, known twice.
   bool coincide(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether the frame's masks say that two objects are two things.
   bool seen_apart(const Step& step, ObjectId a, ObjectId b) const;
   /// The known object that a new one is another side of; or null.
-  LibraryObject* whole_of(const Step& step, const LibraryObject& found);
+  LibraryObject* whole_of(Step& step, const LibraryObject& found);
   /// Takes the marked surfels out of the object and the map, and reports them as gone when they are
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
@@ -92,14 +101,24 @@ class ObjectTracker {
   /// Whether a like object near by is being found gone: then the new one may be that one.
   bool origin_in_doubt(const LibraryObject& object);
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
-  std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found,
-                                  StampNs now_ns) const;
+  std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found) const;
+  bool may_tell(const Motion& motion, const Departure& departure, const LibraryObject& found,
+                StampNs now_ns) const;
   /// The known or new object that is what departed, by the shortest motion; or null.
   LibraryObject* find_departed(const Step& step, const Departure& departure, Motion& motion);
   /// Moves over a distance, once what departed and what arrived are known for kFarWaitS.
   void find_far_moves(Step& step);
   void report_move(Step& step, LibraryObject& found, const Departure& from, const Pose& T_new_old,
                    const std::string& rule);
+  enum class Along {
+    kNo,      ///< the motion does not explain what departed
+    kJoined,  ///< it was a side of the thing that moved, and is of it now
+    kMoved,   ///< it moved alike, and was found there
+  };
+  /// Whether what departed went the way that a thing near by went.
+  Along went_along(Step& step, const Departure& departure, const Move& move);
+  /// After a move: joins what departed and what arrived with it.
+  void gather_sides(Step& step, const Move& move);
   void mark_changed(LibraryObject& object);
   Evidence evidence_of(const Step& step, const LibraryObject& object) const;
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,

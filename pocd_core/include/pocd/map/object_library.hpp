@@ -53,6 +53,9 @@ struct LibraryObject {
   // Who saw it, when.
   StampNs first_seen_ns = 0;
   StampNs last_seen_ns = 0;
+  StampNs in_reach_ns = 0;  ///< the last frame in whose reach it lay, seen or hidden
+  StampNs visit_ns = 0;     ///< when the visit began that this frame belongs to
+  StampNs placed_ns = 0;    ///< since when it is known where it is: first seen, or moved, then
   StampNs in_place_ns = 0;  ///< the last look that found it in its place
   std::string last_robot;
   std::set<std::string> seen_by;  ///< robots that have observed it

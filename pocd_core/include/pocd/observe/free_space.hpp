@@ -31,6 +31,11 @@ class FreeSpace {
   bool seen_empty(const Eigen::Vector3f& point_W) const;
   static constexpr int kLooks = 3;
 
+  /// Something arrived at `surface_W`, seen from `eye_W`: what was known of the space behind it, up
+  /// to `depth_m`, is known no more.
+  void forget_behind(const Eigen::Vector3f& eye_W, const Eigen::Vector3f& surface_W,
+                     double depth_m);
+
   std::size_t block_count() const { return blocks_.size(); }
 
  private:

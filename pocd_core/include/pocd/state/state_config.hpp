@@ -19,6 +19,7 @@ struct StateConfig {
   int erode_frames = 5;
   int wait_for_doubt_frames = 6;
   int merge_frames = 10;
+  double visit_gap_s = 5.0;
   double moment_s = 0.1;
   double relocation_window_s = 60.0;
   double relocation_reach_m = 1.5;
@@ -55,6 +56,9 @@ struct StateConfig {
           "one MOVED then [frames].");
     visit("merge_frames", merge_frames, Range{1, 100000},
           "Objects of one class that share an observation in this many frames are one [frames].");
+    visit("visit_gap_s", visit_gap_s, Range{0.0, 1e6},
+          "When nobody was near an object for this time, the next look is a new visit: what was seen "
+          "of the space between it and its neighbours is complete, and its sides are joined [s].");
     visit(
         "moment_s", moment_s, Range{0.0, 10.0},
         "Looks of several robots at one object within this time are one measurement: the one that "

@@ -17,6 +17,7 @@ struct Departure {
   StampNs first_seen_ns = 0;
   StampNs in_place_ns = 0;  ///< last seen in its place
   StampNs departed_ns = 0;  ///< found gone
+  Arrival arrival = Arrival::kUnknown;
   std::set<std::string> seen_by;
   Evidence evidence;
   bool asked_far = false;  ///< objects at a distance were asked whether they are it
@@ -25,22 +26,41 @@ struct Departure {
 /// How a thing went from its old place to the new one.
 struct Motion {
   Pose T_new_old = Pose::Identity();
-  double length_m = 0.0;  ///< mean over its points
+  double fit = 0.0;      ///< of what is known at the new place, the share that agrees
+  double seen = 0.0;     ///< share of the old surface that is seen at the new place
+  double lengths = 0.0;  ///< of its way (mean over its points), in its own lengths
+  /// Of motions that explain the same, the shortest is the likeliest: the sides of a box are alike.
+  double likelihood() const { return fit + seen - 0.4 * lengths; }
 };
 
-/// Departures within a window of time, oldest first. Not thread-safe.
+/// A thing that was found at a new place.
+struct Move {
+  ObjectId id = ObjectId::kNone;
+  ClassId class_id = 0;
+  OrientedBox from;             ///< where all that is known of it was
+  Pose T_new_old = Pose::Identity();
+  StampNs in_place_ns = 0;  ///< last seen at its old place
+  StampNs moved_ns = 0;     ///< found at the new one
+};
+
+/// Departures and moves within a window of time, oldest first. Not thread-safe.
 class Departures {
  public:
   void add(Departure departure) { list_.push_back(std::move(departure)); }
   /// Those within `window_s` before `now_ns`; older ones are forgotten. Valid until the next call.
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
+  bool has(ObjectId id) const;
   void forget(ObjectId id);
   void set_asked_far(ObjectId id);
+  void add_move(const Move& move) { moves_.push_back(move); }
+  /// As recent().
+  const std::deque<Move>& recent_moves(StampNs now_ns, double window_s);
   /// Nothing that is kept happened after `latest_ns`.
   void set_clock_back(StampNs latest_ns);
 
  private:
   std::deque<Departure> list_;
+  std::deque<Move> moves_;
 };
 
 }  // namespace pocd
