@@ -347,8 +347,8 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   event.evidence = from.evidence;
   event.evidence.rule = rule;
   move.from = before;
+  step.moves.push_back(move);
   departures_.add_move(move);
-  gather_sides(step, move);
 }
 
 }  // namespace pocd

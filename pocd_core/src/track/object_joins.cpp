@@ -298,7 +298,8 @@ ObjectTracker::Along ObjectTracker::went_along(Step& step, const Departure& depa
   return Along::kMoved;
 }
 
-void ObjectTracker::gather_sides(Step& step, const Move& move) {
+void ObjectTracker::gather_sides(Step& step, Move move) {
+  if (!library_.find(move.id)) return;
   std::vector<Departure> departures;
   for (const Departure& d :
        departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {

@@ -345,7 +345,7 @@ void ObjectTracker::report_changes(Step& step) {
   changed_.clear();
   for (const ObjectId id : touched) {
     LibraryObject* object = library_.find(id);
-    if (!object) continue;  // joined with one that moved
+    if (!object) continue;  // it has another id now: it is one that departed
     const double shift_m =
         (object->box.pose.position_W - object->reported_box.pose.position_W).norm();
     const double growth_m =
@@ -357,6 +357,8 @@ void ObjectTracker::report_changes(Step& step) {
     object->reported_box = object->box;
     object->lost = 0;
   }
+  // Grows while it is worked on.
+  for (std::size_t i = 0; i < step.moves.size(); ++i) gather_sides(step, step.moves[i]);
   // Those above, and what was found out about others meanwhile.
   touched.insert(touched.end(), changed_.begin(), changed_.end());
   changed_.clear();

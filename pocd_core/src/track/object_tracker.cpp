@@ -78,7 +78,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                            const Observations& observations, const GroundModel& ground,
                            TsdfMap& map, std::vector<std::uint32_t>& owner_of_pixel,
                            FrameResult& result) {
-  Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}};
+  Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}, {}};
   step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m, config_.map.max_depth_m,
                 config_.association.icp_max_distance_m};
   join_sides(step);
@@ -195,6 +195,7 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
   object.reported_box = object.box;
   object.lost = 0;
+  step.moves.push_back(move);
   departures_.add_move(move);
 }
 

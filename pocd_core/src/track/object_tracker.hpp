@@ -118,7 +118,7 @@ class ObjectTracker {
   /// Whether what departed went the way that a thing near by went.
   Along went_along(Step& step, const Departure& departure, const Move& move);
   /// After a move: joins what departed and what arrived with it.
-  void gather_sides(Step& step, const Move& move);
+  void gather_sides(Step& step, Move move);
   void mark_changed(LibraryObject& object);
   Evidence evidence_of(const Step& step, const LibraryObject& object) const;
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,

@@ -21,6 +21,7 @@ struct ObjectTracker::Step {
   std::vector<Part> parts;
   /// Owner of each part; kNone while that is open.
   std::vector<ObjectId> owners;
+  std::vector<Move> moves;  ///< of this frame
   /// Evidence of this frame's measurement, by object.
   std::map<ObjectId, Evidence> evidence;
 };
