@@ -19,6 +19,9 @@ constexpr int kDisplacedLooks = 3;
 /// Shorter motions than this share of the distance that verifies an object are noise.
 constexpr double kNoiseShare = 0.6;
 
+/// Cells of free space along the depth of view, at most: what is asked of them is coarse, and their
+/// number per frame grows with the third power.
+constexpr double kViewCells = 100.0;
 /// So far in front of a surface a voxel was seen empty.
 constexpr double kClearVoxels = 1.5;
 
@@ -72,7 +75,8 @@ void paint(const Observations& observations, const std::vector<Part>& parts,
 }  // namespace
 
 ObjectTracker::ObjectTracker(const PipelineConfig& config)
-    : config_(config), free_space_(2.0 * config.map.voxel_size_m) {}
+    : config_(config),
+      free_space_(std::max(2.0 * config.map.voxel_size_m, config.map.max_depth_m / kViewCells)) {}
 
 void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, const DepthField& field,
                            const Observations& observations, const GroundModel& ground,

@@ -25,7 +25,7 @@ struct TsdfConfig {
   double max_depth_m = 3.0;
   bool clear_beyond_limit = false;
   int max_weight = 100;
-  int min_publish_weight = 2;
+  int min_publish_weight = 1;
   MapMemoryConfig memory;
 
   double truncation_m() const { return truncation_voxels * voxel_size_m; }
