@@ -5,10 +5,11 @@
 namespace pocd::dds {
 
 ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& participant,
-                                     const NodeFile& config, std::uint64_t epoch)
+                                     const NodeFile& config, std::uint64_t epoch,
+                                     std::uint64_t lineage)
     : node_(config.node),
       classes_(config.pipeline.classes),
-      run_{static_cast<std::uint32_t>(config.node.map_id), epoch},
+      run_{static_cast<std::uint32_t>(config.node.map_id), epoch, lineage},
       states_(participant, topics::kObjects),
       events_(participant, topics::kObjectEvents) {}
 
@@ -21,7 +22,8 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
     events_waiting_.push_back(event);
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
-    objects_[object.id] = object;
+    ObjectSnapshot& known = objects_[object.id] = object;
+    known.seen_in_run = !known_until_ns_ || object.last_seen_ns > *known_until_ns_;
     changed_.insert(object.id);
     touched_.insert(object.id);
   }
@@ -45,6 +47,13 @@ void ObjectPublication::send_events() {
   }
 }
 
+void ObjectPublication::restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns) {
+  known_until_ns_ = stamp_ns;
+  FrameResult known;
+  known.changed_objects = objects;
+  add(known, stamp_ns);
+}
+
 void ObjectPublication::dispose_gone() {
   std::set<ObjectId> gone;
   {
@@ -54,7 +63,7 @@ void ObjectPublication::dispose_gone() {
   for (const ObjectId id : gone) {
     if (published_.count(id) == 0) continue;  // nobody has heard of it
     pocd_msgs::msg::ObjectState state;
-    state.uuid(object_uuid(run_.epoch, id));
+    state.uuid(object_uuid(run_.names(), id));
     if (states_.dispose(state)) {
       published_.erase(id);
       continue;

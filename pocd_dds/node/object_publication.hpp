@@ -22,10 +22,12 @@ namespace pocd::dds {
 class ObjectPublication {
  public:
   ObjectPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
-                    std::uint64_t epoch);
+                    std::uint64_t epoch, std::uint64_t lineage = 0);
 
   // The thread of the pipeline:
 
+  /// Objects that are known from before; once, before all others.
+  void restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns);
   void add(const FrameResult& result, StampNs stamp_ns);
 
   // The thread that writes:
@@ -79,6 +81,7 @@ class ObjectPublication {
   std::deque<ObjectEvent> events_waiting_;
   std::uint64_t dropped_events_ = 0;
   StampNs stamp_ns_ = 0;
+  std::optional<StampNs> known_until_ns_;  // from the memory; later sights are of this run
 };
 
 }  // namespace pocd::dds

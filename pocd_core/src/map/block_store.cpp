@@ -284,6 +284,22 @@ std::vector<BlockKey> BlockStore::take_dirty() {
   ++dirty_list_;  // no block is in the new list, in memory or on disk
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  if (keeps_unsaved_) {
+    unsaved_.insert(unsaved_.end(), keys.begin(), keys.end());
+    if (unsaved_.size() > unsaved_limit_) {
+      std::sort(unsaved_.begin(), unsaved_.end());
+      unsaved_.erase(std::unique(unsaved_.begin(), unsaved_.end()), unsaved_.end());
+      unsaved_limit_ = std::max(unsaved_limit_, 2 * unsaved_.size());
+    }
+  }
+  return keys;
+}
+
+std::vector<BlockKey> BlockStore::take_unsaved() {
+  std::vector<BlockKey> keys = std::move(unsaved_);
+  unsaved_.clear();
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   return keys;
 }
 

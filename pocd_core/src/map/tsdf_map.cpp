@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "block_finder.hpp"
 #include "block_store.hpp"
@@ -158,6 +159,15 @@ std::vector<BlockKey> TsdfMap::keys_by_region() const {
 }
 
 std::vector<BlockKey> TsdfMap::take_dirty() { return impl_->store.take_dirty(); }
+
+void TsdfMap::keep_unsaved() { impl_->store.keep_unsaved(); }
+std::vector<BlockKey> TsdfMap::take_unsaved() { return impl_->store.take_unsaved(); }
+
+void TsdfMap::restore(const std::vector<StoredRegion>& regions,
+                      std::shared_ptr<RegionSource> source) {
+  POCD_CHECK(block_count() == 0);
+  impl_->store.restore(regions, std::move(source));
+}
 
 void TsdfMap::recall(const BlockKey& key) {
   impl_->store.begin_pass();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pocd/common/check.hpp"
 
@@ -103,9 +104,19 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
           }
           if ((*block)[i] < 255) ++(*block)[i];
         }
+        if (block && notes_changes_) changed_.insert({bx, by, bz});
       }
     }
   }
+}
+
+std::set<BlockKey> FreeSpace::take_changed() {
+  std::set<BlockKey> keys = std::move(changed_);
+  changed_.clear();
+  if (!std::exchange(notes_changes_, true)) {
+    for (const auto& entry : blocks_) keys.insert(entry.first);
+  }
+  return keys;
 }
 
 }  // namespace pocd

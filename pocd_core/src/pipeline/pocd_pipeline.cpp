@@ -2,13 +2,16 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <set>
 #include <string>
 
+#include "archive_access.hpp"
 #include "frame_clock.hpp"
 #include "../track/object_tracker.hpp"
+#include "pipeline_archive.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {
@@ -76,6 +79,9 @@ struct PocdPipeline::Impl {
   DepthField field;
   std::vector<std::uint32_t> owner_of_pixel;  ///< of observations
   bool mask_missing = false;
+  PipelineArchive archive;
+
+  PipelineParts parts() { return {frame_clock, pose_gate, ground, robots_with_masks, tracker}; }
 
   /// Whether a robot that delivers masks did not this time.
   bool mask_is_missing(const Frame& frame) {
@@ -197,6 +203,26 @@ std::vector<ObjectSnapshot> PocdPipeline::objects() const {
 }
 
 std::uint64_t PocdPipeline::object_visits() const { return impl_->tracker.library().visits(); }
+
+std::vector<Piece> PocdPipeline::take_changed_pieces() {
+  return impl_->archive.take_changed(impl_->parts());
+}
+
+void PocdPipeline::restore(const std::vector<Piece>& pieces) {
+  impl_->archive.restore(impl_->parts(), pieces, impl_->config.map.voxel_size_m);
+}
+
+PocdPipeline::Numbers PocdPipeline::numbers() const {
+  return {ArchiveAccess::next_id(impl_->tracker), ArchiveAccess::next_event(impl_->tracker)};
+}
+
+void PocdPipeline::skip_to(const Numbers& numbers) {
+  std::uint32_t& object = ArchiveAccess::next_id(impl_->tracker);
+  std::uint64_t& event = ArchiveAccess::next_event(impl_->tracker);
+  object = std::max(object, numbers.object);
+  event = std::max(event, numbers.event);
+}
+
 TsdfMap& PocdPipeline::map() { return impl_->map; }
 const TsdfMap& PocdPipeline::map() const { return impl_->map; }
 

@@ -106,6 +106,7 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     for (Surfel& s : object->model.surfels()) bound(s.last_hit_ns);
     object->moment = {};
   }
+  library_.touch_all();
   departures_.set_clock_back(before_ns);
 }
 

@@ -40,6 +40,7 @@ class ObjectTracker {
   void set_clock_back(StampNs now_ns);
 
  private:
+  friend struct ArchiveAccess;
   struct Step;  ///< what the parts of one update share
 
   // In the order of update().

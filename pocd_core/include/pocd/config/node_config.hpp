@@ -7,6 +7,7 @@
 
 #include "pocd/config/describe.hpp"
 #include "pocd/input/input_config.hpp"
+#include "pocd/memory/memory_config.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 
 namespace pocd {
@@ -65,6 +66,7 @@ struct NodeConfig : InputConfig {
   double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
   bool use_clock = false;
   RosOutputConfig outputs;
+  MemoryConfig memory;
   double shutdown_wait_s = 10.0;
   double health_window_s = 10.0;
   double stall_s = 10.0;
@@ -91,6 +93,7 @@ struct NodeConfig : InputConfig {
           "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
           "use_sim_time).");
     visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
+    visit.group("memory", memory, "What is kept on disk from run to run.");
     visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
           "How long to wait at the end for subscribers to acknowledge [s].");
     visit("health_window_s", health_window_s, Range{0.1, 3600.0},

@@ -13,6 +13,7 @@
 #include "pocd/config/describe.hpp"
 #include "pocd/input/frame.hpp"
 #include "pocd/map/map_memory.hpp"
+#include "pocd/map/region_source.hpp"
 #include "pocd/map/voxel_block.hpp"
 
 namespace pocd {
@@ -113,6 +114,14 @@ class TsdfMap {
 
   /// Keys of blocks changed (or dropped) since the last call, canonical order; clears the list.
   std::vector<BlockKey> take_dirty();
+
+  /// From now on take_unsaved() gives the keys that take_dirty() has given since its own last call:
+  /// for who writes down what was published.
+  void keep_unsaved();
+  std::vector<BlockKey> take_unsaved();
+  /// Puts regions that were there before this process into an empty map: their voxels are read from
+  /// `source` when they are needed. Nothing of it is dirty.
+  void restore(const std::vector<StoredRegion>& regions, std::shared_ptr<RegionSource> source);
 
   /// Brings the region of a block back to memory, or finds that it is lost.
   void recall(const BlockKey& key);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <unordered_map>
 
 #include "pocd/association/visibility.hpp"
@@ -33,13 +34,20 @@ class FreeSpace {
 
   std::size_t block_count() const { return blocks_.size(); }
 
+  /// Keys of the blocks that may have changed since the last call, for who writes them down; noted
+  /// from the first call on.
+  std::set<BlockKey> take_changed();
+
  private:
+  friend struct ArchiveAccess;
   static constexpr int kSide = 8;
   static constexpr int kCells = kSide * kSide * kSide;
   using Block = std::array<std::uint8_t, kCells>;
 
   double cell_m_;
   std::unordered_map<BlockKey, std::unique_ptr<Block>, BlockKeyHash> blocks_;  ///< looked up only
+  bool notes_changes_ = false;
+  std::set<BlockKey> changed_;
 };
 
 }  // namespace pocd

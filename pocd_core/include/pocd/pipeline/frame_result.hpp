@@ -28,6 +28,8 @@ struct ObjectSnapshot {
   std::uint32_t observations = 0;
   std::string last_robot;            ///< namespace of the robot that saw it last
   std::vector<std::string> seen_by;  ///< all robots that have seen it, by name
+  /// Seen since the program started: false for what is known from a memory only. Set by publishers.
+  bool seen_in_run = true;
 };
 
 enum class EventKind { kAdded, kUpdated, kMoved, kRemoved };

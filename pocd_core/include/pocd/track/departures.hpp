@@ -40,6 +40,7 @@ class Departures {
   void set_clock_back(StampNs latest_ns);
 
  private:
+  friend struct ArchiveAccess;
   std::deque<Departure> list_;
 };
 
