@@ -76,6 +76,8 @@ void count(const std::vector<ObjectEvent>& events, MapProgress& progress) {
       case EventKind::kRemoved:
         ++progress.removed;
         break;
+      case EventKind::kOperator:
+        break;
     }
   }
 }

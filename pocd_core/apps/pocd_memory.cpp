@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cinttypes>
 #include <cstdio>
+#include <fstream>
 #include <iostream>
 #include <limits>
 
@@ -43,6 +44,20 @@ int verify(const std::filesystem::path& folder) {
   return wrong.empty() ? 0 : 1;
 }
 
+/// When each region of the map was last looked at.
+void export_looks(pocd::MemoryReader& log, const std::filesystem::path& file) {
+  const double side_m =
+      log.info().voxel_size_m * (pocd::VoxelBlock::kSide << pocd::BlockKey::kRegionShift);
+  std::ofstream out(file);
+  out << "low_x,low_y,low_z,side,last_looked_ns\n";
+  for (const auto& [region, stamp_ns] : log.last_looks()) {
+    out << region.x * side_m << ',' << region.y * side_m << ',' << region.z * side_m << ','
+        << side_m << ',' << stamp_ns << '\n';
+  }
+  out.close();
+  if (!out) throw pocd::InputError(file.string() + ": cannot be written in full");
+}
+
 void export_all(const std::filesystem::path& folder, const std::filesystem::path& output) {
   std::filesystem::create_directories(output);
   pocd::MemoryReader log(folder);
@@ -70,6 +85,7 @@ void export_all(const std::filesystem::path& folder, const std::filesystem::path
   }
   events.close();
   standing.close();
+  export_looks(log, output / "regions.csv");
 }
 
 }  // namespace
@@ -91,7 +107,8 @@ int main(int argc, char** argv) {
   };
   add("info", "What it holds, as YAML");
   add("verify", "Reads everything; one line for each thing that is wrong");
-  add("export", "Map file, all events, and the last event of everything that stands (CSV)")
+  add("export", "Map file, all events, the last event of everything that stands, and when each region was\n"
+               "last looked at (CSV)")
       ->add_option("--output", output, "Folder for the files, made if missing")
       ->required();
   add("compact", "Gives room that is not used any more back to the disk; not while a node runs");

@@ -69,6 +69,7 @@ pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, const M
   message.last_robot(object.last_robot);
   message.seen_by(object.seen_by);
   message.seen_in_run(object.seen_in_run);
+  message.forgotten(object.forgotten);
   return message;
 }
 
@@ -85,6 +86,7 @@ ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message) {
   object.last_robot = message.last_robot();
   object.seen_by = message.seen_by();
   object.seen_in_run = message.seen_in_run();
+  object.forgotten = message.forgotten();
   return object;
 }
 
@@ -123,6 +125,9 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, const MapRun
   evidence.after(belief_of(event.evidence.after));
   evidence.rule(event.evidence.rule);
   message.evidence(evidence);
+  message.last_there(to_time(event.last_there_ns));
+  message.first_gone(to_time(event.first_gone_ns));
+  message.by(event.by);
   return message;
 }
 
@@ -151,6 +156,9 @@ ObjectEvent event_from(const pocd_msgs::msg::ObjectEvent& message) {
   event.evidence.before = belief_from(evidence.before());
   event.evidence.after = belief_from(evidence.after());
   event.evidence.rule = evidence.rule();
+  event.last_there_ns = to_stamp(message.last_there());
+  event.first_gone_ns = to_stamp(message.first_gone());
+  event.by = message.by();
   return event;
 }
 

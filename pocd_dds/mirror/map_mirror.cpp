@@ -160,7 +160,12 @@ void MapMirror::Impl::turn() {
 void MapMirror::Impl::take_objects() {
   object_states.take_some(kMost, [&](const msg::ObjectState& state, const dds::SampleMeta& meta) {
     if (meta.valid) {
-      if (state.map_id() == options.map_id) objects[state.uuid()] = state;
+      if (state.map_id() != options.map_id) return;
+      if (state.forgotten()) {
+        objects.erase(state.uuid());
+      } else {
+        objects[state.uuid()] = state;
+      }
     } else if (meta.disposed) {
       objects.erase(meta.key);
     }

@@ -113,6 +113,7 @@ void ObjectWatch::Impl::take_states() {
     if (meta.disposed) gone(meta.key, Gone::kRemoved);
     // Not valid and not disposed: its node has gone, which says nothing about the object.
     if (!meta.valid || state.map_id() != options.map_id) return;
+    if (state.forgotten()) return gone(state.uuid(), Gone::kForgotten);
     if (known.size() >= options.most_objects && known.count(state.uuid()) == 0) {
       if (too_many++ == 0) tell("more than most_objects are on the bus (said once, counted)");
       return;

@@ -49,9 +49,24 @@ void MapPublication::restored(StampNs stamp_ns) {
   for (const auto& [key, tile] : publisher_.tiles()) {
     kept_waiting_.push_back(key);
     changed_.insert(key);
+    not_looked_.insert(region_of(key));
   }
   stamp_ns_ = stamp_ns;
   announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size(), stamp_ns};
+}
+
+void MapPublication::looked_at(const std::vector<BlockKey>& regions) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (not_looked_.empty()) return;
+  for (const BlockKey& region : regions) {
+    if (not_looked_.erase(region) == 0) continue;
+    constexpr std::int32_t kTiles = (1 << BlockKey::kRegionShift) / 2;  // along a side
+    for (std::int32_t i = 0; i < kTiles * kTiles * kTiles; ++i) {
+      const TileKey key{region.x * kTiles + i % kTiles, region.y * kTiles + i / kTiles % kTiles,
+                        region.z * kTiles + i / kTiles / kTiles};
+      if (publisher_.tiles().count(key) > 0) changed_.insert(key);
+    }
+  }
 }
 
 bool MapPublication::begin_step(bool now) {

@@ -35,6 +35,10 @@ class MapPublication {
 
   /// Goes on from what another run has published: publisher() has been restored. Before all others.
   void restored(StampNs stamp_ns);
+  /// The thread that changes the map: regions that were looked at in this run.
+  void looked_at(const std::vector<BlockKey>& regions);
+  /// Regions from before this run that were not looked at since; while hold() is held.
+  const std::set<BlockKey>& not_looked() const { return not_looked_; }
   /// To be restored.
   MapPublisher& publisher_to_restore() { return publisher_; }
 
@@ -107,6 +111,7 @@ class MapPublication {
   std::deque<TileKey> tiles_waiting_;  // what they are is looked up when they leave
   std::deque<TileKey> kept_waiting_;   // tiles from before this run: after all others
   std::set<TileKey> changed_;
+  std::set<BlockKey> not_looked_;
 
   // Only the thread that sends.
   Announced announced_;

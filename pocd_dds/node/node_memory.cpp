@@ -49,12 +49,15 @@ void NodeMemory::add(const FrameResult& result) {
   memory_->add(result);
 }
 
-bool NodeMemory::overdue() const { return memory_ && changed_ && memory_->due(); }
+bool NodeMemory::overdue() const {
+  if (!memory_) return false;
+  return hurried_ ? memory_->free() : changed_ && memory_->due();
+}
 
 void NodeMemory::step(PocdPipeline& pipeline, const MapPublisher& publisher, StampNs stamp_ns) {
   if (!overdue()) return;
-  changed_ = false;
-  memory_->step(pipeline, publisher, stamp_ns);
+  changed_ = hurried_ = false;
+  memory_->step(pipeline, publisher, stamp_ns != 0 ? stamp_ns : memory_->stamp_ns());
 }
 
 void NodeMemory::finish(PocdPipeline& pipeline, const MapPublisher& publisher, StampNs stamp_ns) {

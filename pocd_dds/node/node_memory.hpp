@@ -24,6 +24,8 @@ class NodeMemory {
                std::uint64_t epoch, const std::string& name);
 
   void add(const FrameResult& result);
+  /// The next step is not to wait until its period is over.
+  void hurry() { hurried_ = true; }
   /// Something has changed and waits longer than it should: the next step of the map is due.
   bool overdue() const;
   /// Right after a step of the map.
@@ -39,7 +41,7 @@ class NodeMemory {
  private:
   const NodeFile config_;
   std::optional<WarehouseMemory> memory_;
-  bool changed_ = false;
+  bool changed_ = false, hurried_ = false;
   std::uint64_t failures_counted_ = 0;
 };
 

@@ -27,7 +27,20 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
     changed_.insert(object.id);
     touched_.insert(object.id);
   }
+  std::set<ObjectId> forgotten;
+  for (const ObjectEvent& event : result.events) {
+    if (event.kind == EventKind::kOperator) forgotten.insert(event.object);
+  }
   for (const ObjectId id : result.retired) {
+    const auto known = objects_.find(id);
+    if (known != objects_.end() && forgotten.count(id) > 0) {
+      forgotten_.push_back(std::move(known->second));
+      forgotten_.back().forgotten = true;
+      objects_.erase(known);
+      changed_.erase(id);
+      touched_.insert(id);
+      continue;
+    }
     objects_.erase(id);
     changed_.erase(id);
     touched_.insert(id);
@@ -73,6 +86,31 @@ void ObjectPublication::dispose_gone() {
   }
 }
 
+void ObjectPublication::send_forgotten() {
+  const auto time = std::chrono::steady_clock::now();
+  std::vector<ObjectSnapshot> forgotten;
+  StampNs stamp_ns = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    forgotten.swap(forgotten_);
+    stamp_ns = stamp_ns_;
+    while (!said_forgotten_.empty() && time - said_forgotten_.front().second > kForgottenStays) {
+      gone_.insert(said_forgotten_.front().first);
+      said_forgotten_.pop_front();
+    }
+  }
+  for (ObjectSnapshot& object : forgotten) {
+    auto message = object_message(object, run_, classes_, stamp_ns, node_.map_frame);
+    if (states_.write(message)) {
+      published_.insert(object.id);
+      said_forgotten_.emplace_back(object.id, time);
+      continue;
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    forgotten_.push_back(std::move(object));
+  }
+}
+
 std::vector<ObjectId> ObjectPublication::take_due(bool now) {
   const auto time = std::chrono::steady_clock::now();
   const double since_s = std::chrono::duration<double>(time - last_sent_).count();
@@ -104,6 +142,7 @@ bool ObjectPublication::send_state(ObjectId id) {
 void ObjectPublication::send_due(bool now) {
   send_events();
   // What Fast DDS refuses, because the writer is full, is tried again next time.
+  send_forgotten();
   dispose_gone();
   for (const ObjectId id : take_due(now)) {
     if (send_state(id)) continue;

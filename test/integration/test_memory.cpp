@@ -35,6 +35,7 @@ struct Heard {
       const std::lock_guard<std::mutex> lock(mutex);
       present.erase(object.uuid);
       replaced += why == Gone::kReplaced;
+      forgotten += why == Gone::kForgotten;
     };
     watch = std::make_unique<ObjectWatch>(options);
   }
@@ -46,11 +47,15 @@ struct Heard {
     const std::lock_guard<std::mutex> lock(mutex);
     return replaced;
   }
+  int objects_forgotten() {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return forgotten;
+  }
 
   ObjectWatchOptions options;
   std::mutex mutex;
   std::map<Uuid, WatchedObject> present;
-  int replaced = 0;
+  int replaced = 0, forgotten = 0;
   std::unique_ptr<ObjectWatch> watch;
 };
 
@@ -197,6 +202,100 @@ TEST_F(NodeMemoryTest, EventsSinceANumberAcrossRestarts) {
   EXPECT_TRUE(ask(~0ull, 10).events().empty());
   second.signal(SIGINT);
   EXPECT_EQ(second.wait().exit_code, 0);
+}
+
+TEST_F(NodeMemoryTest, WhatAnOperatorSaysIsFollowedRecordedAndAnswered) {
+  Heard heard(domain_);
+  Process first(node({"--epoch", "1", "--set", "node.commands=true"}));
+  ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "70"})).exit_code, 0);
+  ASSERT_TRUE(eventually([&] { return heard.objects().size() >= 2; }));
+  const auto say = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), bin("pocd_command"));
+    for (const char* more : {"--by", "mira", "--domain"}) words.emplace_back(more);
+    words.push_back(domain_.text());
+    return run_command(words);
+  };
+  const WatchedObject object = heard.objects().begin()->second;
+  const CommandResult forgotten =
+      say({"forget-object", std::to_string(to_index(object.state.id))});
+  EXPECT_EQ(forgotten.exit_code, 0) << forgotten.err;
+  EXPECT_NE(forgotten.out.find("done: 1 object forgotten; event "), std::string::npos)
+      << forgotten.out;
+  ASSERT_TRUE(eventually([&] { return heard.objects().count(object.uuid) == 0; }));
+  EXPECT_EQ(heard.objects_forgotten(), 1) << "nobody has seen it go";
+  EXPECT_EQ(heard.objects_replaced(), 0);
+  // The answer came when it was on disk.
+  const auto last = [&] { return MemoryReader(folder()).events(0, 10000).back(); };
+  EXPECT_EQ(last().event.kind, EventKind::kOperator);
+  EXPECT_EQ(last().event.by, "mira");
+  EXPECT_EQ(last().event.evidence.rule, "forget_object");
+  const CommandResult again = say({"forget-object", std::to_string(to_index(object.state.id))});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.out.find("is not known"), std::string::npos) << again.out;
+  EXPECT_EQ(say({"ignore-region", "dock", "--polygon", "0,0 1,0 1,1"}).exit_code, 0);
+  EXPECT_EQ(last().event.evidence.rule, "ignore_region dock");
+  EXPECT_EQ(say({"save"}).exit_code, 0);
+  first.signal(SIGKILL);
+  first.wait();
+  // What was said holds in the next run.
+  Process second(node({"--epoch", "2", "--set", "node.commands=true"}));
+  EXPECT_EQ(say({"heed-region", "dock"}).exit_code, 0);
+  EXPECT_EQ(say({"heed-region", "dock"}).exit_code, 1);
+  EXPECT_EQ(say({"reset"}).exit_code, 0);
+  ASSERT_TRUE(eventually([&] { return heard.objects().empty(); }));
+  EXPECT_EQ(MemoryReader(folder()).info().objects, 0u);
+  EXPECT_TRUE(MemoryReader(folder()).verify().empty());
+  second.signal(SIGINT);
+  EXPECT_EQ(second.wait().exit_code, 0);
+}
+
+TEST_F(NodeMemoryTest, ACommandThatComesAgainIsAnsweredAndNotFollowedAgain) {
+  Process node_process(node_command(domain_, {"--lossless", "--set", "node.commands=true"}));
+  const auto participant = test_participant(domain_);
+  dds::Wakeup wakeup;
+  dds::Writer<pocd_msgs::msg::CommandPubSubType> commands(participant, dds::topics::kCommand);
+  dds::Reader<pocd_msgs::msg::CommandReplyPubSubType> replies(
+      participant, dds::topics::kCommandReply, wakeup);
+  ASSERT_TRUE(eventually([&] { return commands.matched() > 0 && replies.matched() > 0; }));
+  const auto say = [&](std::uint64_t number, std::uint8_t kind, const std::string& by) {
+    pocd_msgs::msg::Command command;
+    command.requester({7});
+    command.number(number);
+    command.kind(kind);
+    command.by(by);
+    commands.write(command);
+    pocd_msgs::msg::CommandReply reply;
+    dds::SampleMeta meta;
+    EXPECT_TRUE(eventually([&] { return replies.take(reply, meta) && meta.valid; }));
+    EXPECT_EQ(reply.number(), number);
+    return reply;
+  };
+  const auto once = say(1, 2, "mira");
+  EXPECT_TRUE(once.done()) << once.text();
+  EXPECT_FALSE(once.stored()) << "there is no memory";
+  EXPECT_EQ(say(1, 2, "mira").seq(), once.seq());
+  EXPECT_EQ(say(2, 2, "mira").seq(), once.seq() + 1);
+  EXPECT_NE(say(3, 9, "mira").text().find("kind 9 is no command"), std::string::npos);
+  EXPECT_NE(say(4, 2, "").text().find("by is empty"), std::string::npos);
+  EXPECT_NE(say(5, 0, "mira").text().find("not of this lineage"), std::string::npos);
+  const auto saved = say(6, 6, "mira");
+  EXPECT_FALSE(saved.done());
+  EXPECT_NE(saved.text().find("no memory"), std::string::npos) << saved.text();
+  node_process.signal(SIGINT);
+  EXPECT_EQ(node_process.wait().exit_code, 0);
+}
+
+TEST_F(NodeMemoryTest, WithoutCommandsNobodyListens) {
+  Process quiet(node());
+  ASSERT_TRUE(
+      eventually([&] { return quiet.err().find("running on domain") != std::string::npos; }));
+  const CommandResult said = run_command({bin("pocd_command"), "reset", "--by", "mira",
+                                          "--timeout", "2", "--domain",
+                                          domain_.text()});
+  EXPECT_EQ(said.exit_code, 1);
+  EXPECT_NE(said.err.find("node.commands"), std::string::npos) << said.err;
+  quiet.signal(SIGINT);
+  EXPECT_EQ(quiet.wait().exit_code, 0);
 }
 
 TEST_F(NodeMemoryTest, ASecondNodeOnTheFolderIsRefused) {

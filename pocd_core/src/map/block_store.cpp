@@ -182,6 +182,19 @@ void BlockStore::drop(std::uint32_t slot) {
   if (in.members.empty()) erase(r);
 }
 
+void BlockStore::clear() {
+  if (file_) file_ = std::make_unique<PageFile>(memory_.folder);
+  for (const BlockKey& key : sorted_keys()) list_dirty(key);
+  regions_.clear();
+  last_region_ = newest_ = oldest_ = nullptr;
+  chunks_.clear();
+  free_chunks_.clear();
+  spare_.clear();
+  owner_slots_.clear();
+  owner_regions_on_disk_.clear();
+  size_ = size_on_disk_ = regions_in_memory_ = chunk_count_ = owner_entries_ = 0;
+}
+
 std::vector<BlockKey> BlockStore::sorted_keys() const {
   std::vector<BlockKey> keys;
   keys.reserve(size_);

@@ -81,6 +81,10 @@ class BlockStore {
   /// Brings those on disk back.
   std::vector<std::uint32_t> take_owner(std::uint32_t owner);
 
+  /// Nothing is there any more; all blocks that were are dirty. Throws InputError, with nothing
+  /// changed, when there is no new file for evicted regions.
+  void clear();
+
   /// Dirty blocks are listed once. drop() lists a block that was ever dirty. The list is at most
   /// twice as long as there are places in it, and a little.
   void mark_dirty(std::uint32_t slot);

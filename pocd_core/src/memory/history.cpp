@@ -12,7 +12,8 @@ constexpr std::size_t kPage = 1000;
 
 void apply(const LoggedEvent& logged, HistoryState& state) {
   if (logged.event.absorbed) state.erase(*logged.event.absorbed);
-  if (logged.event.kind == EventKind::kRemoved) {
+  const EventKind kind = logged.event.kind;
+  if (kind == EventKind::kRemoved || kind == EventKind::kOperator) {
     state.erase(logged.event.object);
   } else {
     state[logged.event.object] = logged;
@@ -67,7 +68,8 @@ std::vector<Difference> History::between(StampNs from_ns, StampNs to_ns, double 
     const ObjectEvent& event = logged.event;
     if (event.stamp_ns <= from_ns || event.stamp_ns > to_ns) return;
     if (event.absorbed) gone[*event.absorbed] = logged;
-    if (event.kind == EventKind::kRemoved) gone[event.object] = logged;
+    const bool goes = event.kind == EventKind::kRemoved || event.kind == EventKind::kOperator;
+    if (goes && event.object != ObjectId::kNone) gone[event.object] = logged;
   });
   std::vector<Difference> list;
   for (const auto& [id, now] : after) {

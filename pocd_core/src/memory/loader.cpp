@@ -70,7 +70,7 @@ Loaded load(Database& database, const StoredState& state) {
                      std::to_string(found.rows) + " rows that are not the " +
                      std::to_string(state.totals[table].rows) + " of the last step");
   };
-  for (const Table table : {kParts, kObjects, kFreeSpaceTable}) {
+  for (const Table table : {kParts, kObjects, kFreeSpaceTable, kRegionsTable}) {
     check(table, read_rows(
                      database, table,
                      [&](std::int64_t key, std::vector<std::uint8_t> data) {

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "../map/zstd_codec.hpp"
 #include "folder_lock.hpp"
 #include "loader.hpp"
 #include "pocd/common/check.hpp"
@@ -113,6 +114,23 @@ std::map<ClassId, std::string> MemoryReader::class_names() {
     Statement rows(impl_->database, "SELECT id, name FROM classes");
     while (rows.step()) names[static_cast<ClassId>(rows.integer(0))] = rows.text(1);
     return names;
+  });
+}
+
+std::vector<std::pair<BlockKey, StampNs>> MemoryReader::last_looks() {
+  return reading([&] {
+    std::vector<std::pair<BlockKey, StampNs>> looks;
+    const auto damaged = [](const std::string& what) { throw InputError(what); };
+    read_rows(
+        impl_->database, kRegionsTable,
+        [&](std::int64_t key, std::vector<std::uint8_t> data) {
+          StampNs stamp_ns = 0;
+          unarchive(decompress(data.data(), data.size(), sizeof stamp_ns, "region"), "region",
+                    stamp_ns);
+          looks.emplace_back(block_key(static_cast<std::uint64_t>(key)), stamp_ns);
+        },
+        damaged);
+    return looks;
   });
 }
 

@@ -18,6 +18,7 @@ constexpr const char* kTablesSql = R"sql(
   CREATE TABLE parts(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE objects(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE free_space(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
+  CREATE TABLE regions(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE tiles(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE voxel_index(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE voxels(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);

@@ -133,7 +133,7 @@ void StepWriter::drop_old_events(StampNs newest_ns) {
     } catch (const InputError&) {  // damaged: its object is not known to stand anywhere
     }
     if (event.absorbed) drop_standing_.bind(1, to_index(*event.absorbed)).run();
-    if (event.kind == EventKind::kRemoved) {
+    if (event.kind == EventKind::kRemoved || event.kind == EventKind::kOperator) {
       drop_standing_.bind(1, object).run();
     } else {
       put_standing_.bind(1, object)

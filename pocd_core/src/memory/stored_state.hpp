@@ -20,12 +20,14 @@ void archive(Archive& a, MapDigest& d) {
 }
 
 template <class Archive>
-void archive(Archive& a, ObjectEvent& e) {
+void archive(Archive& a, ObjectEvent& event) {
+  auto& [sequence, kind, object, class_id, stamp_ns, frame_sequence, robot, box, previous_box,
+         absorbed, evidence, last_there_ns, first_gone_ns, by] = event;
   a.version(1);
-  a(e.sequence, e.kind, e.object, e.class_id, e.stamp_ns, e.frame_sequence, e.robot, e.box,
-    e.previous_box, e.absorbed, e.evidence);
+  a(sequence, kind, object, class_id, stamp_ns, frame_sequence, robot, box, previous_box, absorbed,
+    evidence, last_there_ns, first_gone_ns, by);
   if constexpr (Archive::kLoads) {
-    if (e.kind < EventKind::kAdded || e.kind > EventKind::kRemoved) a.fail("is of no known kind");
+    if (kind < EventKind::kAdded || kind > EventKind::kOperator) a.fail("is of no known kind");
   }
 }
 
@@ -37,9 +39,19 @@ void archive(Archive& a, PocdPipeline::Numbers& n) {
 namespace memory {
 
 /// Tables whose rows have a key, a checksum and bytes.
-enum Table { kParts, kObjects, kFreeSpaceTable, kTiles, kVoxelIndex, kVoxels, kTables };
-constexpr std::array<const char*, kTables> kTableNames = {"parts", "objects",     "free_space",
-                                                          "tiles", "voxel_index", "voxels"};
+enum Table {
+  kParts,
+  kObjects,
+  kFreeSpaceTable,
+  kRegionsTable,
+  kTiles,
+  kVoxelIndex,
+  kVoxels,
+  kTables
+};
+constexpr std::array<const char*, kTables> kTableNames = {
+    "parts", "objects", "free_space", "regions", "tiles", "voxel_index", "voxels"};
+static_assert(kPieceKinds == kTiles, "each kind of piece has a table of its number");
 
 /// Of all rows of a table: a row that is missing or of another time is noticed.
 struct Total {

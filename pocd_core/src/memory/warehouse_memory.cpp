@@ -37,7 +37,7 @@ std::unique_ptr<Database> open_for_writing(const std::filesystem::path& file) {
     // A commit is on the disk when it returns: the writer's thread waits, nobody else.
     database->execute(
         "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
-        "PRAGMA wal_autocheckpoint = 2000; PRAGMA journal_size_limit = 8000000;");
+        "PRAGMA wal_autocheckpoint = 8000; PRAGMA journal_size_limit = 8000000;");
     return database;
   } catch (const DatabaseError& error) {
     throw InputError(error.what());
@@ -258,8 +258,12 @@ bool WarehouseMemory::due() const {
   if (std::chrono::duration<double>(Clock::now() - m.last_step).count() < m.config.period_s) {
     return false;
   }
-  const std::lock_guard<std::mutex> guard(m.mutex);
-  return !m.waiting && !m.status.stopped;
+  return free();
+}
+
+bool WarehouseMemory::free() const {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  return !impl_->waiting && !impl_->status.stopped;
 }
 
 void WarehouseMemory::step(PocdPipeline& pipeline, const MapPublisher& publisher, StampNs stamp_ns,

@@ -110,6 +110,25 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
   }
 }
 
+void FreeSpace::forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside) {
+  for (auto entry = blocks_.begin(); entry != blocks_.end();) {
+    const BlockKey key = entry->first;
+    Block& block = *entry->second;
+    bool changed = false, left = false;
+    for (int i = 0; i < kCells; ++i) {
+      const Eigen::Vector2d center(kSide * key.x + (i & 7) + 0.5,
+                                   kSide * key.y + (i >> 3 & 7) + 0.5);
+      if (block[i] != 0 && inside(center * cell_m_)) {
+        block[i] = 0;
+        changed = true;
+      }
+      left |= block[i] != 0;
+    }
+    if (changed && notes_changes_) changed_.insert(key);
+    entry = changed && !left ? blocks_.erase(entry) : std::next(entry);
+  }
+}
+
 std::set<BlockKey> FreeSpace::take_changed() {
   std::set<BlockKey> keys = std::move(changed_);
   changed_.clear();

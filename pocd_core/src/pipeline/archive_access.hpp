@@ -8,44 +8,96 @@
 #include "archive_object.hpp"
 #include "../track/object_tracker.hpp"
 #include "frame_clock.hpp"
+#include "ignored_regions.hpp"
+#include "looked_at.hpp"
 #include "pocd/pipeline/pose_gate.hpp"
 #include "pocd/segmentation/planes.hpp"
 
 namespace pocd {
 
+/// Each description names all members: one that is added does not compile until it was decided
+/// what becomes of it.
 struct ArchiveAccess {
   template <class Archive>
-  static void describe(Archive& a, FrameClock::Heard& h) {
-    a(h.stamp_ns, h.frame, h.off_in_a_row);
+  static void describe(Archive& a, FrameClock::Heard& heard) {
+    auto& [stamp_ns, frame, off_in_a_row] = heard;
+    a(stamp_ns, frame, off_in_a_row);
   }
   template <class Archive>
-  static void describe(Archive& a, FrameClock& c) {
-    a(c.newest_ns_, c.frames_);
-    by_robot(a, c.robots_);
+  static void describe(Archive& a, FrameClock& clock) {
+    auto& [newest_ns, robots, frames] = clock;
+    a(newest_ns, frames);
+    by_robot(a, robots);
   }
   using Track = PoseGate::Track;
   template <class Archive>
-  static void describe(Archive& a, Track& t) {
-    a(t.accepted, t.accepted_ns, t.velocity_mps, t.step_s, t.refused, t.refused_ns,
-      t.refused_in_a_row);
+  static void describe(Archive& a, Track& track) {
+    auto& [accepted, accepted_ns, velocity_mps, step_s, refused, refused_ns, in_a_row] = track;
+    a(accepted, accepted_ns, velocity_mps, step_s, refused, refused_ns, in_a_row);
   }
   template <class Archive>
-  static void describe(Archive& a, PoseGate& g) {
-    by_robot(a, g.tracks_);
+  static void describe(Archive& a, PoseGate& gate) {
+    [[maybe_unused]] auto& [config, tracks] = gate;
+    by_robot(a, tracks);
   }
   template <class Archive>
-  static void describe(Archive& a, GroundModel& g) {
-    a(g.known_, g.from_class_, g.normal_W_, g.offset_m_, g.level_m_, g.is_strip_);
+  static void describe(Archive& a, GroundModel& ground) {
+    auto& [known, from_class, normal_W, offset_m, level_m, is_strip] = ground;
+    a(known, from_class, normal_W, offset_m, level_m, is_strip);
   }
   template <class Archive>
-  static void describe(Archive& a, Departures& d) {
-    a(d.list_);
+  static void describe(Archive& a, IgnoredRegions& ignored) {
+    auto& [by_name] = ignored;
+    a(by_name);
+  }
+  template <class Archive>
+  static void describe(Archive& a, Departures& departures) {
+    auto& [list] = departures;
+    a(list);
+  }
+
+  /// First all first bytes of a field, then all second ones, and so on: they are alike and compress.
+  template <class Archive, class T>
+  static void by_planes(Archive& a, std::vector<Surfel>& surfels, T Surfel::*field) {
+    std::vector<std::uint8_t> plane(surfels.size());
+    for (std::size_t k = 0; k < sizeof(T); ++k) {
+      const auto byte = [&](std::size_t i) {
+        return reinterpret_cast<std::uint8_t*>(&(surfels[i].*field)) + k;
+      };
+      if constexpr (!Archive::kLoads) {
+        for (std::size_t i = 0; i < surfels.size(); ++i) plane[i] = *byte(i);
+      }
+      a.raw(plane.data(), plane.size());
+      if constexpr (Archive::kLoads) {
+        for (std::size_t i = 0; i < surfels.size(); ++i) *byte(i) = plane[i];
+      }
+    }
+  }
+  template <class Archive>
+  static void by_planes(Archive& a, std::vector<Surfel>& surfels) {
+    surfels.resize(a.count(surfels.size()));
+    if (surfels.empty()) return;
+    // All members, as below.
+    [[maybe_unused]] auto& [point, normal, weight, hits, through, is_new, hit_ns] = surfels.front();
+    by_planes(a, surfels, &Surfel::point_W);
+    by_planes(a, surfels, &Surfel::normal_W);
+    by_planes(a, surfels, &Surfel::weight);
+    by_planes(a, surfels, &Surfel::hits);
+    by_planes(a, surfels, &Surfel::seen_through);
+    std::vector<std::uint8_t> arrived;
+    for (const Surfel& surfel : surfels) arrived.push_back(surfel.arrived ? 1 : 0);
+    a.raw(arrived.data(), arrived.size());
+    if constexpr (Archive::kLoads) {
+      for (std::size_t i = 0; i < surfels.size(); ++i) surfels[i].arrived = arrived[i] == 1;
+    }
+    by_planes(a, surfels, &Surfel::last_hit_ns);
   }
 
   /// The index lists each surfel in its own cell, or in one that it crept out of.
   template <class Archive>
   static void describe(Archive& a, ObjectModel& m) {
-    a(m.surfels_);
+    [[maybe_unused]] auto& [spacing_m, inverse_spacing, surfels, index] = m;
+    by_planes(a, surfels);
     std::vector<std::pair<std::int32_t, std::uint64_t>> elsewhere;  // surfel, cell
     if constexpr (!Archive::kLoads) {
       bool any = false;
@@ -92,10 +144,20 @@ struct ArchiveAccess {
     return *block;
   }
 
+  static StampNs& looked_ns(LookedAt& looked, const BlockKey& region) {
+    [[maybe_unused]] auto& [inverse_m, last_ns, fresh, changed, notes_changes] = looked;
+    return last_ns[region];
+  }
+
   /// But for objects and free space, which are pieces of their own.
   template <class Archive>
-  static void describe(Archive& a, ObjectTracker& t) {
-    a(t.library_.next_id_, t.next_event_, t.departures_, t.arrivals_);
+  static void describe(Archive& a, ObjectTracker& tracker) {
+    // Looks are of one frame, and what changed is listed with each result.
+    [[maybe_unused]] auto& [config, library, free_space, departures, arrivals, next_event, looks,
+                            changed] = tracker;
+    [[maybe_unused]] auto& [objects, grid, filed, next_id, notes, touched, visits] = library;
+    [[maybe_unused]] auto& [cell_m, blocks, notes_changes, changed_blocks] = free_space;
+    a(next_id, next_event, departures, arrivals);
   }
   static ObjectLibrary& library(ObjectTracker& t) { return t.library_; }
   static FreeSpace& free_space(ObjectTracker& t) { return t.free_space_; }

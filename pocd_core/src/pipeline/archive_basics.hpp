@@ -8,25 +8,32 @@
 
 namespace pocd {
 
+// Each names all members: one that is added does not compile until it is described.
+
 template <class Archive>
-void archive(Archive& a, Pose4& p) {
-  a(p.position_W, p.yaw_rad);
+void archive(Archive& a, Pose4& pose) {
+  auto& [position_W, yaw_rad] = pose;
+  a(position_W, yaw_rad);
 }
 
 template <class Archive>
-void archive(Archive& a, OrientedBox& b) {
-  a(b.pose, b.size_m);
+void archive(Archive& a, OrientedBox& box) {
+  auto& [pose, size_m] = box;
+  a(pose, size_m);
 }
 
 template <class Archive>
-void archive(Archive& a, Belief& b) {
-  a(b.mu, b.sigma, b.alpha, b.beta);
+void archive(Archive& a, Belief& belief) {
+  auto& [mu, sigma, alpha, beta] = belief;
+  a(mu, sigma, alpha, beta);
 }
 
 template <class Archive>
-void archive(Archive& a, Evidence& e) {
-  a(e.delta_m, e.stationarity_class, e.k, e.c1, e.c2, e.visible_share, e.seen_through_share,
-    e.measurement_sigma_m, e.before, e.after, e.rule);
+void archive(Archive& a, Evidence& evidence) {
+  auto& [delta_m, stationarity_class, k, c1, c2, visible_share, seen_through_share,
+         measurement_sigma_m, before, after, rule] = evidence;
+  a(delta_m, stationarity_class, k, c1, c2, visible_share, seen_through_share, measurement_sigma_m,
+    before, after, rule);
 }
 
 }  // namespace pocd

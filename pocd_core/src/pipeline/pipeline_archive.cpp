@@ -8,17 +8,19 @@
 namespace pocd {
 namespace {
 
-enum Part : std::uint64_t { kGates = 1, kGround = 2, kTracker = 3 };
+enum Part : std::uint64_t { kGates = 1, kGround = 2, kTracker = 3, kIgnored = 4 };
+constexpr std::size_t kParts = 4;
 
 std::string name_of(const Piece& piece) {
-  static const char* const kinds[] = {"part", "object", "block of free space"};
+  static const char* const kinds[] = {"part", "object", "block of free space", "region"};
   return std::string(kinds[static_cast<int>(piece.kind)]) + " " + std::to_string(piece.key);
 }
 
-// 21 bits per axis.
 constexpr std::int64_t kHalf = std::int64_t{1} << 20;
 
-std::uint64_t packed(const BlockKey& key) {
+}  // namespace
+
+std::uint64_t piece_key(const BlockKey& key) {
   const auto axis = [](std::int32_t v) {
     POCD_CHECK(v >= -kHalf && v < kHalf);
     return static_cast<std::uint64_t>(v + kHalf);
@@ -26,14 +28,12 @@ std::uint64_t packed(const BlockKey& key) {
   return axis(key.z) << 42 | axis(key.y) << 21 | axis(key.x);
 }
 
-BlockKey unpacked(std::uint64_t key) {
+BlockKey block_key(std::uint64_t key) {
   const auto axis = [](std::uint64_t bits) {
     return static_cast<std::int32_t>(static_cast<std::int64_t>(bits & (2 * kHalf - 1)) - kHalf);
   };
   return {axis(key), axis(key >> 21), axis(key >> 42)};
 }
-
-}  // namespace
 
 void PipelineArchive::add(PieceKind kind, std::uint64_t key, std::vector<std::uint8_t> bytes,
                           std::vector<Piece>& out) {
@@ -55,6 +55,7 @@ std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
   add(PieceKind::kPart, kGates, gates.take(), out);
   add(PieceKind::kPart, kGround, archived(parts.ground), out);
   add(PieceKind::kPart, kTracker, archived(parts.tracker), out);
+  add(PieceKind::kPart, kIgnored, archived(parts.ignored), out);
   ObjectLibrary& library = ArchiveAccess::library(parts.tracker);
   for (const ObjectId id : library.take_touched()) {
     const LibraryObject* object = std::as_const(library).find(id);
@@ -64,7 +65,11 @@ std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
   FreeSpace& space = ArchiveAccess::free_space(parts.tracker);
   for (const BlockKey& key : space.take_changed()) {
     const auto* block = ArchiveAccess::free_block(space, key);
-    add(PieceKind::kFreeSpace, packed(key), block ? archived(*block) : std::vector<std::uint8_t>{},
+    add(PieceKind::kFreeSpace, piece_key(key), block ? archived(*block) : std::vector<std::uint8_t>{},
+        out);
+  }
+  for (const BlockKey& key : parts.looked_at.take_changed()) {
+    add(PieceKind::kRegion, piece_key(key), archived(ArchiveAccess::looked_ns(parts.looked_at, key)),
         out);
   }
   return out;
@@ -85,6 +90,8 @@ void PipelineArchive::restore(const PipelineParts& parts, const std::vector<Piec
           a(parts.ground);
         } else if (piece.key == kTracker) {
           a(parts.tracker);
+        } else if (piece.key == kIgnored) {
+          a(parts.ignored);
         } else {
           a.fail("is not known");
         }
@@ -99,13 +106,16 @@ void PipelineArchive::restore(const PipelineParts& parts, const std::vector<Piec
       }
       case PieceKind::kFreeSpace:
         a(ArchiveAccess::make_free_block(ArchiveAccess::free_space(parts.tracker),
-                                         unpacked(piece.key)));
+                                         block_key(piece.key)));
+        break;
+      case PieceKind::kRegion:
+        a(ArchiveAccess::looked_ns(parts.looked_at, block_key(piece.key)));
         break;
     }
     a.finish();
     hash_of_[{piece.kind, piece.key}] = XXH3_64bits(piece.bytes.data(), piece.bytes.size());
   }
-  if (found.size() != 3) throw InputError("pieces of a pipeline: a part is missing");
+  if (found.size() != kParts) throw InputError("pieces of a pipeline: a part is missing");
   for (const auto& [id, object] : library.all()) {
     if (to_index(id) >= ArchiveAccess::next_id(parts.tracker)) {
       throw InputError("object " + std::to_string(to_index(id)) + ": has a number of the future");
@@ -114,6 +124,7 @@ void PipelineArchive::restore(const PipelineParts& parts, const std::vector<Piec
   // What was just put there is as it was given.
   library.take_touched();
   ArchiveAccess::free_space(parts.tracker).take_changed();
+  parts.looked_at.take_changed();
 }
 
 }  // namespace pocd

@@ -14,6 +14,8 @@ namespace pocd {
 
 class FrameClock;
 class GroundModel;
+class IgnoredRegions;
+class LookedAt;
 class ObjectTracker;
 class PoseGate;
 
@@ -23,6 +25,8 @@ struct PipelineParts {
   PoseGate& gate;
   GroundModel& ground;
   std::set<std::string>& robots_with_masks;
+  IgnoredRegions& ignored;
+  LookedAt& looked_at;
   ObjectTracker& tracker;
 };
 

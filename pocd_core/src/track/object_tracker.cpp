@@ -169,6 +169,7 @@ void ObjectTracker::update_beliefs(Step& step) {
 void ObjectTracker::move_displaced(Step& step, Look& look) {
   LibraryObject& object = *look.object;
   const OrientedBox previous_box = object.box;
+  const StampNs last_there_ns = object.in_place_ns;
   object.looks_displaced = 0;
   object.model.transform(look.T_new_old);
   for (Surfel& s : object.model.surfels()) s.seen_through = 0;
@@ -186,7 +187,9 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   object.added_ns.reset();
   object.arrival = Arrival::kArrived;
   object.moved = true;
-  add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
+  ObjectEvent& event = add_event(step, EventKind::kMoved, object, "aligned_elsewhere");
+  event.previous_box = previous_box;
+  event.last_there_ns = last_there_ns;
   object.reported_box = object.box;
   object.lost = 0;
 }

@@ -27,7 +27,9 @@ enum class Gone {
   /// Its node was killed or has ended, and a new run that does not know it goes on: one without a
   /// memory, or one whose memory had not kept it yet. Nobody has looked whether it is still there:
   /// its place is unknown and not free.
-  kReplaced
+  kReplaced,
+  /// An operator had it forgotten. Its place is unknown and not free.
+  kForgotten
 };
 
 /// Callbacks may be empty. They are called one at a time, by a thread of the watch, in the order in

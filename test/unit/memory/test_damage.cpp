@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(
                "UPDATE objects SET data = zeroblob(20) WHERE key = (SELECT min(key) FROM objects)",
                "of objects is damaged"},
         Defect{"Part", "UPDATE parts SET sum = sum + 1 WHERE key = 1", "row 1 of parts is damaged"},
-        Defect{"PartMissing", "DELETE FROM parts WHERE key = 2", "parts has 2 rows"},
+        Defect{"PartMissing", "DELETE FROM parts WHERE key = 2", "parts has 3 rows"},
         Defect{"ObjectMissing", "DELETE FROM objects WHERE key = (SELECT max(key) FROM objects)",
                "objects has"},
         Defect{

@@ -9,7 +9,7 @@ namespace pocd::test {
 std::vector<std::string> stored_pieces(const std::filesystem::path& folder) {
   memory::Database database(folder / memory::kFileName, memory::Database::Access::kRead);
   std::vector<std::string> rows;
-  for (const char* table : {"parts", "objects", "free_space", "tiles", "voxel_index", "voxels"}) {
+  for (const char* table : {"parts", "objects", "free_space", "regions", "tiles", "voxel_index", "voxels"}) {
     memory::Statement all(
         database, (std::string("SELECT key, data FROM ") + table + " ORDER BY key").c_str());
     while (all.step()) {

@@ -21,6 +21,7 @@ struct RosOutputConfig {
   double diagnostics_hz = 1.0;
   double occupancy_low_m = 0.1;
   double occupancy_high_m = 2.0;
+  int occupancy_not_looked_at = -1;
   int surface_points = 2'000'000;
   double obstacle_lifetime_s = 3.0;
   double rate_mb_s = 10.0;
@@ -40,6 +41,9 @@ struct RosOutputConfig {
           "Lower end of the heights where a surface makes a cell of the grid occupied [m].");
     visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
           "Upper end of these heights [m].");
+    visit("occupancy_not_looked_at", occupancy_not_looked_at, Range{-2, 100},
+          "Value of a cell that is known from the memory and not looked at since the node started; "
+          "-1: unknown, -2: as it was.");
     visit("surface_points", surface_points, Range{1000, 50'000'000},
           "Most points of rt/pocd/surface; a larger surface is thinned.");
     visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
@@ -67,6 +71,7 @@ struct NodeConfig : InputConfig {
   bool use_clock = false;
   RosOutputConfig outputs;
   MemoryConfig memory;
+  bool commands = false;
   double shutdown_wait_s = 10.0;
   double health_window_s = 10.0;
   double stall_s = 10.0;
@@ -94,6 +99,8 @@ struct NodeConfig : InputConfig {
           "use_sim_time).");
     visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
     visit.group("memory", memory, "What is kept on disk from run to run.");
+    visit("commands", commands,
+          "Follow what operators say on pocd/command: whoever may write there changes the map.");
     visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
           "How long to wait at the end for subscribers to acknowledge [s].");
     visit("health_window_s", health_window_s, Range{0.1, 3600.0},

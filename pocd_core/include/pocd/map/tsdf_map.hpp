@@ -94,6 +94,16 @@ class TsdfMap {
   std::size_t clear_object_where(ObjectId id,
                                  const std::function<bool(const Eigen::Vector3d&)>& inside);
 
+  /// Resets all voxels, of any owner, whose centre [m, W] lies in the column between `low` and
+  /// `high` [m, W] and is accepted by `inside`; drops blocks that end without a surface. Reads the
+  /// regions of the column back from disk. Returns how many voxels were reset.
+  std::size_t clear_column(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                           const std::function<bool(const Eigen::Vector2d&)>& inside);
+
+  /// Everything becomes unknown. Reads nothing from disk. Throws InputError, with nothing changed,
+  /// when map.memory.folder takes no new file.
+  void clear();
+
   /// Voxels of `from` become voxels of `to` (two library entries found to be one thing).
   std::size_t reassign_object(ObjectId from, ObjectId to);
 

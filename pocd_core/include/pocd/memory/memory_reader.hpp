@@ -66,6 +66,9 @@ class MemoryReader {
   std::vector<LoggedEvent> standing();
   std::uint64_t damaged_events() const;
   std::map<ClassId, std::string> class_names();
+  /// Regions of the map (block key >> BlockKey::kRegionShift), and the stamp of the last frame that
+  /// measured a surface in each.
+  std::vector<std::pair<BlockKey, StampNs>> last_looks();
 
   /// Reads everything: one line for each thing that is wrong.
   std::vector<std::string> verify();

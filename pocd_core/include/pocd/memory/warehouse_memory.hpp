@@ -75,7 +75,9 @@ class WarehouseMemory {
 
   /// Events go to the log with the next step.
   void add(const FrameResult& result);
-  /// The step before has been written and the period is over.
+  /// The step before has been written.
+  bool free() const;
+  /// The same, and the period is over.
   bool due() const;
   /// Takes over what has changed. Right after MapPublisher::take_over(), before the next frame.
   /// Waits for the step before.

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <set>
 #include <unordered_map>
@@ -31,6 +32,9 @@ class FreeSpace {
   /// there since.
   bool seen_empty(const Eigen::Vector3f& point_W) const;
   static constexpr int kLooks = 3;
+
+  /// Nothing is known any more of the cells whose centre [m, W] `inside` accepts.
+  void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
 
   std::size_t block_count() const { return blocks_.size(); }
 

@@ -7,6 +7,7 @@
 #include "pocd/input/frame.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd/pipeline/frame_result.hpp"
+#include "pocd/pipeline/operator_word.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/pipeline/pipeline_pieces.hpp"
 
@@ -32,6 +33,14 @@ class PocdPipeline {
   /// Objects and places that were looked at so far (ObjectLibrary::visits); TsdfMap::visits tells
   /// the same of the map.
   std::uint64_t object_visits() const;
+
+  /// Regions of the map in which a surface was measured since the last call, ascending. Without
+  /// those of before a restore().
+  std::vector<BlockKey> take_looked_at();
+
+  /// Does what an operator says, between two frames; its events have the stamp of the newest frame.
+  /// A word that cannot be followed changes nothing, and the outcome says why.
+  WordOutcome apply(const OperatorWord& word);
 
   /// Everything beside the voxels that later frames depend on, as far as it is not what it was at
   /// the last call or at restore(); at the first call, all there is. Between two frames.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 
 #include "pocd/map/object_library.hpp"
 
@@ -16,7 +17,8 @@ struct Departure {
   std::vector<Surfel> surfels;
   StampNs first_seen_ns = 0;
   StampNs in_place_ns = 0;  ///< last seen in its place
-  StampNs departed_ns = 0;  ///< found gone
+  StampNs first_gone_ns = 0;  ///< first of the looks in a row that found it gone; 0: not known
+  StampNs departed_ns = 0;    ///< found gone
   std::set<std::string> seen_by;
   Evidence evidence;
   bool asked_far = false;  ///< objects at a distance were asked whether they are it
@@ -35,6 +37,8 @@ class Departures {
   /// Those within `window_s` before `now_ns`; older ones are forgotten. Valid until the next call.
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
   void forget(ObjectId id);
+  /// Those whose box has its middle [m, W] where `inside` accepts it.
+  void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
   void set_asked_far(ObjectId id);
   /// Nothing that is kept happened after `latest_ns`.
   void set_clock_back(StampNs latest_ns);
