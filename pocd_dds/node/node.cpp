@@ -63,9 +63,9 @@ struct Node::Impl {
                               keeper.lineage(options.epoch)},
                        wakeup)
                  : nullptr),
+        restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
         health(config.node.health_window_s, config.node.stall_s),
-        restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
         intake(participant, config.node, config.pipeline, watch, queue, latency),
         worker([this] { guard("pocd_worker", [this] { work(); }); }),
         teller([this] { guard("pocd_teller", [this] { tell(); }); }),

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -94,8 +95,16 @@ class MemoryRunner {
     stamp_ns_ = frames[next_ - 1].stamp_ns;
     events_.insert(events_.end(), result.events.begin(), result.events.end());
     if (memory_) memory_->add(result);
+    if (const auto word = says ? says(next_, pipeline_) : std::nullopt) {
+      const WordOutcome outcome = pipeline_.apply(*word);
+      EXPECT_TRUE(outcome.done) << outcome.text;
+      events_.insert(events_.end(), outcome.result.events.begin(), outcome.result.events.end());
+      if (memory_) memory_->add(outcome.result);
+    }
     return true;
   }
+  /// What an operator says after so many frames.
+  std::function<std::optional<OperatorWord>(std::uint64_t frames, const PocdPipeline&)> says;
   void publish() { publisher_.update(pipeline_.map()); }
   void step() {
     publish();

@@ -64,10 +64,12 @@ TEST_F(HistoryOfARun, DifferencesNameTheirEvidence) {
   });
   ASSERT_NE(removed, events_.end()) << "a box goes";
   const auto gone = history_->between(removed->stamp_ns - 1, removed->stamp_ns, 1e9);
-  ASSERT_EQ(gone.size(), 1u);
-  EXPECT_EQ(gone[0].kind, DifferenceKind::kRemoved);
-  EXPECT_EQ(line(gone[0].evidence.event), line(*removed));
-  EXPECT_TRUE(gone[0].before.has_value());
+  const auto told = std::find_if(gone.begin(), gone.end(), [&](const Difference& d) {
+    return d.kind == DifferenceKind::kRemoved && line(d.evidence.event) == line(*removed);
+  });
+  ASSERT_NE(told, gone.end());
+  EXPECT_TRUE(told->before.has_value());
+  for (const Difference& d : gone) EXPECT_EQ(d.evidence.event.stamp_ns, removed->stamp_ns);
   EXPECT_THROW(history_->between(end_ns, 0, 0.0), InputError);
 }
 

@@ -24,6 +24,37 @@ std::vector<std::string> stored_pieces(const std::filesystem::path& folder) {
 
 namespace {
 
+/// Four words in the course of the circuit, of what is known first.
+std::optional<OperatorWord> circuit_words(std::uint64_t frames, const PocdPipeline& pipeline) {
+  const std::uint64_t sixth = circuit_frames().size() / 6;
+  if (frames % sixth != 0 || frames == 0) return std::nullopt;
+  OperatorWord word;
+  word.by = "test";
+  word.region = "dock";
+  const auto known = pipeline.objects();
+  if (known.empty()) return std::nullopt;
+  word.object = known.front().id;
+  const Eigen::Vector2d at = known.front().box.pose.position_W.head<2>();
+  for (const auto& corner : {Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, -1), Eigen::Vector2d(0, 1)})
+    word.polygon_W.push_back(at + corner);
+  switch (frames / sixth) {
+    case 2:
+      word.kind = WordKind::kIgnoreRegion;
+      return word;
+    case 3:
+      word.kind = WordKind::kForgetObject;
+      return word;
+    case 4:
+      word.kind = WordKind::kHeedRegion;
+      return word;
+    case 5:
+      word.kind = WordKind::kForgetRegion;
+      return word;
+    default:
+      return std::nullopt;
+  }
+}
+
 class SameRun : public ::testing::Test {
  protected:
   /// Without a stop, with a memory that is written once, at the end.
@@ -35,6 +66,7 @@ class SameRun : public ::testing::Test {
     static const Whole result = [] {
       const ScratchFolder folder;
       MemoryRunner run(circuit_config(), folder / "memory");
+      run.says = circuit_words;
       while (run.process(circuit_frames())) {
       }
       Whole all;
@@ -49,6 +81,7 @@ class SameRun : public ::testing::Test {
 
 TEST_F(SameRun, IsTheRunWithoutAMemory) {
   MemoryRunner run(circuit_config());
+  run.says = circuit_words;
   while (run.process(circuit_frames())) {
   }
   const ScratchFolder folder;
@@ -77,6 +110,7 @@ TEST_F(SameRun, WhateverFramesItIsStoppedAt) {
     bool done = false;
     while (!done) {
       MemoryRunner run(config, folder / "memory");
+      run.says = circuit_words;
       const std::uint64_t stop = run.next() + 1 + random.below(circuit_frames().size() / 4);
       while (run.next() < stop && run.process(circuit_frames())) {
         if (random.below(6) == 0) run.step();
