@@ -9,6 +9,7 @@
 #include "memory/database.hpp"
 #include "memory/schema.hpp"
 #include "memory_run.hpp"
+#include "pocd/common/random.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd::test {
@@ -243,6 +244,57 @@ TEST(WarehouseMemory, AFolderThatIsReadOnlyIsNamed) {
   });
   if (code == 77) GTEST_SKIP() << "file systems cannot be mounted here";
   EXPECT_EQ(code, 0);
+}
+
+/// Floor and racks over so much ground [m2], in voxels of 5 cm, with some noise.
+void build_halls(TsdfMap& map, double area_m2) {
+  const int side = static_cast<int>(std::sqrt(area_m2) / 0.4);
+  Random random(3);
+  const auto fill = [&](const BlockKey& key, bool wall) {
+    VoxelBlock& block = map.touch(key);
+    for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
+      const double across = wall ? (i & 7) - 3.3 : (i >> 6) - 3.3;
+      const double noisy = across / 4.0 * 32767.0 + static_cast<double>(random.below(400));
+      block.tsdf[i] = static_cast<std::int16_t>(std::clamp(noisy, -32767.0, 32767.0));
+      block.weight[i] = static_cast<std::uint16_t>(20 + random.below(8));
+    }
+  };
+  for (int x = 0; x < side; ++x) {
+    for (int y = 0; y < side; ++y) {
+      fill({x, y, 0}, false);
+      for (int z = 1; x % 8 == 0 && z < 8; ++z) fill({x, y, z}, true);
+    }
+  }
+}
+
+// POCD_AREA_M2: how much ground; for a large one by hand.
+TEST(WarehouseMemory, ALargePlaceIsThereSoon) {
+  const char* text = std::getenv("POCD_AREA_M2");
+  const double area_m2 = text != nullptr ? std::atof(text) : 500.0;
+  const ScratchFolder folder;
+  std::uint64_t tiles = 0;
+  {
+    MemoryRunner run(circuit_config(), folder / "memory");
+    build_halls(run.pipeline().map(), area_m2);
+    ASSERT_TRUE(run.process(small_frames()));
+    ASSERT_TRUE(run.finish());
+    tiles = run.publisher().tiles().size();
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const auto since_s = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  MemoryRunner again(circuit_config(), folder / "memory");
+  const double restored_s = since_s();
+  ASSERT_TRUE(again.process(small_frames()));
+  again.publish();
+  const double first_s = since_s();
+  EXPECT_EQ(again.publisher().tiles().size(), tiles);
+  EXPECT_LT(first_s, 3.0 + 1e-4 * area_m2);
+  std::printf("%g m2, %llu tiles, %.1f MB: restored in %.2f s, first frame published after %.2f s\n",
+              area_m2, static_cast<unsigned long long>(tiles),
+              1e-6 * static_cast<double>(MemoryReader(folder / "memory").info().file_bytes),
+              restored_s, first_s);
 }
 
 }  // namespace
