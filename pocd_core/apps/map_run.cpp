@@ -61,38 +61,54 @@ class Progress {
   double last_ = 0.0;
 };
 
-void count(const std::vector<ObjectEvent>& events, RunSummary& summary) {
+void count(const std::vector<ObjectEvent>& events, MapProgress& progress) {
   for (const ObjectEvent& event : events) {
     switch (event.kind) {
       case EventKind::kAdded:
-        ++summary.added;
+        ++progress.added;
         break;
       case EventKind::kUpdated:
-        ++summary.updated;
+        ++progress.updated;
         break;
       case EventKind::kMoved:
-        ++summary.moved;
+        ++progress.moved;
         break;
       case EventKind::kRemoved:
-        ++summary.removed;
+        ++progress.removed;
+        break;
+      case EventKind::kOperator:
         break;
     }
   }
 }
 
-void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary,
-                 std::ostream& log) {
+void note(const MapProgress& progress, const DatasetReader& reader, RunSummary& summary) {
+  summary.frames = progress.frames;
+  summary.refused = progress.refused;
+  summary.skipped = reader.skipped() + progress.unusable;
+  summary.added = progress.added;
+  summary.updated = progress.updated;
+  summary.moved = progress.moved;
+  summary.removed = progress.removed;
+}
+
+void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory& memory,
+                 RunSummary& summary, std::ostream& log) {
   const std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
   EventsCsv events(options.output / "events.csv");
   TimingCsv timing(options.output / "timing.csv");
   Progress progress(options.show_progress, reader->size());
   std::size_t reported = 0;
-  std::size_t unusable = 0;  // read, but no frame that the pipeline takes
+  MapProgress progress_made = memory.progress();
+  std::uint64_t already = progress_made.read;  // frames that are in the memory
+  memory.repeat_events(events, options.config.classes);
+  StampNs stamp_ns = 0;
   const auto report = [&](const std::string& line) {
     progress.clear();
     log << line << '\n';
   };
   while (true) {
+    note(progress_made, *reader, summary);
     if ((options.stop && *options.stop) ||
         (options.max_frames && summary.frames >= *options.max_frames)) {
       summary.stopped_early = true;
@@ -111,37 +127,46 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, RunSummar
     for (; reported < reader->problems().size(); ++reported) {
       report("skipped: " + reader->problems()[reported]);
     }
-    summary.skipped = reader->skipped() + unusable;
     if (!frame) break;
+    stamp_ns = frame->stamp_ns;
+    if (already > 0) {
+      --already;
+      continue;
+    }
+    ++progress_made.read;
 
     FrameResult result;
     try {
       result = pipeline.process_frame(*frame);
     } catch (const InputError& error) {
-      ++unusable;
+      ++progress_made.unusable;
       report("skipped: frame " + std::to_string(frame->sequence) + ": " + error.what());
       continue;
     }
-    ++summary.frames;
-    if (!result.accepted) ++summary.refused;
+    ++progress_made.frames;
+    if (!result.accepted) ++progress_made.refused;
+    memory.add(result);
     for (const std::string& warning : result.warnings) {
       report("frame " + std::to_string(frame->sequence) + ": " + warning);
     }
     for (const ObjectEvent& event : result.events) {
       events.add(event, options.config.classes.name(event.class_id));
     }
-    count(result.events, summary);
+    count(result.events, progress_made);
+    memory.step(progress_made, stamp_ns);
+    if (const auto problem = memory.take_problem()) report(*problem);
     result.timings.insert(result.timings.begin(), read);
     timing.add(*frame, result.timings);
     progress.update(summary);
   }
+  note(progress_made, *reader, summary);
   events.close();
   timing.close();
+  memory.finish(progress_made, stamp_ns);
 }
 
-void write_map(const MapRunOptions& options, PocdPipeline& pipeline, RunSummary& summary,
-               std::ostream& log) {
-  MapPublisher publisher(1, options.config.map);
+void write_map(const MapRunOptions& options, PocdPipeline& pipeline, MapPublisher& publisher,
+               RunSummary& summary, std::ostream& log) {
   publisher.update(pipeline.map());
   if (const auto problem = pipeline.map().take_problem()) {
     log << *problem << '\n';
@@ -190,13 +215,15 @@ RunSummary run_map(const MapRunOptions& options, std::ostream& log) {
 
   const auto start = std::chrono::steady_clock::now();
   PocdPipeline pipeline(options.config);
-  process_all(options, pipeline, summary, log);
+  MapPublisher publisher(1, options.config.map);
+  MapMemory memory(options.memory, options.config, pipeline, publisher);
+  process_all(options, pipeline, memory, summary, log);
   summary.seconds = seconds_since(start);
   if (summary.frames == 0 && !summary.stopped_early) {
     throw InputError("no good frame in the inputs (" + std::to_string(summary.skipped) +
                      " skipped)");
   }
-  write_map(options, pipeline, summary, log);
+  write_map(options, pipeline, publisher, summary, log);
   write_summary(summary, options.output / "summary.yaml");
   return summary;
 }

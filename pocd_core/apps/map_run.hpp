@@ -7,6 +7,7 @@
 #include <iosfwd>
 #include <optional>
 
+#include "map_memory.hpp"
 #include "pocd/config/run_summary.hpp"
 #include "pocd/datasets/dataset_reader.hpp"
 
@@ -16,6 +17,7 @@ struct MapRunOptions {
   DatasetOptions dataset;
   PipelineConfig config;
   std::filesystem::path output;
+  MapMemoryOptions memory;
   std::optional<std::uint64_t> max_frames;
   bool show_progress = false;
   const volatile std::sig_atomic_t* stop = nullptr;  ///< non-zero: finish with what is there

@@ -61,10 +61,24 @@ int main(int argc, char** argv) {
   app.add_option("--output", options.output, "Folder for the results, made if missing")->required();
   app.add_option("--max-frames", options.max_frames, "Stop after that many good frames")
       ->check(CLI::Range(1, 1000000000));
+  app.add_option("--memory", options.memory.config.folder,
+                 "Folder that keeps what is known: the run goes on from what it holds and leaves "
+                 "there what it knows");
+  app.add_flag("--resume", options.memory.resume,
+               "The inputs are those of the run that was ended before its time: frames that are in "
+               "the memory are not taken again");
+  app.add_option("--memory-period", options.memory.config.period_s,
+                 "Least time between two steps that are kept [s]")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (options.memory.resume && !options.memory.config.on()) {
+    std::cerr << "pocd_map: --resume needs --memory\n";
+    return 2;
   }
   try {
     pocd::NodeFile file;

@@ -11,6 +11,11 @@
 
 namespace pocd::dds {
 
+/// The region of the map that a tile lies in.
+inline BlockKey region_of(const TileKey& tile) {
+  return BlockKey{2 * tile.x, 2 * tile.y, 2 * tile.z}.region();
+}
+
 pocd_msgs::msg::MapTile tile_message(const MapTile& tile, std::uint32_t map_id,
                                      std::uint64_t epoch);
 /// CRC of the payload does not fit it: nothing.

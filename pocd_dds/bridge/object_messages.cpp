@@ -36,11 +36,11 @@ Belief belief_from(const pocd_msgs::msg::Belief& message) {
 
 }  // namespace
 
-std::array<std::uint8_t, 16> object_uuid(std::uint64_t epoch, ObjectId id) {
+std::array<std::uint8_t, 16> object_uuid(std::uint64_t lineage, ObjectId id) {
   std::array<std::uint8_t, 16> uuid{};
   const std::uint64_t number = to_index(id);
   for (int i = 0; i < 8; ++i) {
-    uuid[i] = static_cast<std::uint8_t>(epoch >> (56 - 8 * i));
+    uuid[i] = static_cast<std::uint8_t>(lineage >> (56 - 8 * i));
     uuid[8 + i] = static_cast<std::uint8_t>(number >> (56 - 8 * i));
   }
   return uuid;
@@ -50,10 +50,11 @@ pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, const M
                                            const ClassMap& classes, StampNs stamp_ns,
                                            const std::string& frame_id) {
   pocd_msgs::msg::ObjectState message;
-  message.uuid(object_uuid(run.epoch, object.id));
+  message.uuid(object_uuid(run.names(), object.id));
   message.header(header_of(stamp_ns, frame_id));
   message.map_id(run.map_id);
   message.epoch(run.epoch);
+  message.lineage(run.names());
   message.local_id(to_index(object.id));
   message.class_id(object.class_id);
   message.class_name(classes.name(object.class_id));
@@ -67,6 +68,8 @@ pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, const M
   message.observations(object.observations);
   message.last_robot(object.last_robot);
   message.seen_by(object.seen_by);
+  message.seen_in_run(object.seen_in_run);
+  message.forgotten(object.forgotten);
   return message;
 }
 
@@ -82,6 +85,8 @@ ObjectSnapshot object_from(const pocd_msgs::msg::ObjectState& message) {
   object.observations = message.observations();
   object.last_robot = message.last_robot();
   object.seen_by = message.seen_by();
+  object.seen_in_run = message.seen_in_run();
+  object.forgotten = message.forgotten();
   return object;
 }
 
@@ -91,9 +96,10 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, const MapRun
   message.header(header_of(event.stamp_ns, frame_id));
   message.map_id(run.map_id);
   message.epoch(run.epoch);
+  message.lineage(run.names());
   message.seq(event.sequence);
   message.kind(static_cast<std::uint8_t>(event.kind));
-  message.uuid(object_uuid(run.epoch, event.object));
+  message.uuid(object_uuid(run.names(), event.object));
   message.local_id(to_index(event.object));
   message.class_id(event.class_id);
   message.class_name(classes.name(event.class_id));
@@ -103,7 +109,7 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, const MapRun
   message.has_previous_box(event.previous_box.has_value());
   if (event.previous_box) message.previous_box(box_of(*event.previous_box));
   if (event.absorbed) {
-    message.absorbed_uuid(object_uuid(run.epoch, *event.absorbed));
+    message.absorbed_uuid(object_uuid(run.names(), *event.absorbed));
     message.absorbed_local_id(to_index(*event.absorbed));
   }
   pocd_msgs::msg::Evidence evidence;
@@ -119,6 +125,9 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, const MapRun
   evidence.after(belief_of(event.evidence.after));
   evidence.rule(event.evidence.rule);
   message.evidence(evidence);
+  message.last_there(to_time(event.last_there_ns));
+  message.first_gone(to_time(event.first_gone_ns));
+  message.by(event.by);
   return message;
 }
 
@@ -147,6 +156,9 @@ ObjectEvent event_from(const pocd_msgs::msg::ObjectEvent& message) {
   event.evidence.before = belief_from(evidence.before());
   event.evidence.after = belief_from(evidence.after());
   event.evidence.rule = evidence.rule();
+  event.last_there_ns = to_stamp(message.last_there());
+  event.first_gone_ns = to_stamp(message.first_gone());
+  event.by = message.by();
   return event;
 }
 

@@ -16,10 +16,15 @@ namespace pocd::dds {
 struct MapRun {
   std::uint32_t map_id = 0;
   std::uint64_t epoch = 0;
+  std::uint64_t lineage = 0;  ///< of the node's memory; 0: without one, the epoch
+
+  /// What names objects.
+  std::uint64_t names() const { return lineage != 0 ? lineage : epoch; }
 };
 
-/// Eight bytes of epoch and eight of the id, most significant first: never the same in two epochs.
-std::array<std::uint8_t, 16> object_uuid(std::uint64_t epoch, ObjectId id);
+/// Eight bytes of lineage and eight of the id, most significant first: never the same in two
+/// lineages.
+std::array<std::uint8_t, 16> object_uuid(std::uint64_t lineage, ObjectId id);
 
 pocd_msgs::msg::ObjectState object_message(const ObjectSnapshot& object, const MapRun& run,
                                            const ClassMap& classes, StampNs stamp_ns,

@@ -32,10 +32,11 @@ OccupancyProjection::Cells OccupancyProjection::project(const MapTile& tile) con
 }
 
 void OccupancyProjection::apply(const std::vector<MapTile>& changed,
-                                const std::vector<TileKey>& removed) {
+                                const std::vector<TileKey>& removed,
+                                const std::set<TileKey>& old) {
   for (const MapTile& tile : changed) {
     const Tower tower{tile.key.x, tile.key.y};
-    towers_[tower][tile.key.z] = project(tile);
+    towers_[tower][tile.key.z] = {project(tile), old.count(tile.key) > 0};
     dirty_.insert(tower);
   }
   for (const TileKey& key : removed) {
@@ -52,8 +53,18 @@ OccupancyProjection::Cells OccupancyProjection::top_view(const Tower& tower) con
   cells.fill(kCellUnknown);
   const auto known = towers_.find(tower);
   if (known == towers_.end()) return cells;
+  const bool as_it_was = options_.not_looked_at == OccupancyOptions::kAsItWas;
   for (const auto& [z, layer] : known->second) {
-    for (std::size_t i = 0; i < cells.size(); ++i) cells[i] = std::max(cells[i], layer[i]);
+    if (layer.old && !as_it_was) continue;
+    for (std::size_t i = 0; i < cells.size(); ++i) cells[i] = std::max(cells[i], layer.cells[i]);
+  }
+  if (as_it_was) return cells;
+  // What was looked at and is in the way stays in the way.
+  for (const auto& [z, layer] : known->second) {
+    for (std::size_t i = 0; layer.old && i < cells.size(); ++i) {
+      if (layer.cells[i] != kCellUnknown && cells[i] != kCellOccupied)
+        cells[i] = static_cast<std::int8_t>(options_.not_looked_at);
+    }
   }
   return cells;
 }

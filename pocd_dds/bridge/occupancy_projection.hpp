@@ -22,6 +22,9 @@ struct OccupancyOptions {
   double truncation_m = 0.2;
   double low_m = 0.1;   ///< heights from here
   double high_m = 2.0;  ///< to here decide whether a cell is occupied
+  /// Value of what nobody has looked at for long; kAsItWas: as if somebody had.
+  int not_looked_at = kCellUnknown;
+  static constexpr int kAsItWas = -2;
 };
 
 /// Cells [x, x + width) x [y, y + height), row-major, x fastest.
@@ -42,8 +45,10 @@ class OccupancyProjection {
 
   explicit OccupancyProjection(const OccupancyOptions& options) : options_(options) {}
 
-  /// Takes over a step of the map. Throws InputError for a payload that is no tile.
-  void apply(const std::vector<MapTile>& changed, const std::vector<TileKey>& removed);
+  /// Takes over a step of the map. `old`: those of the changed tiles that nobody has looked at for
+  /// long. Throws InputError for a payload that is no tile.
+  void apply(const std::vector<MapTile>& changed, const std::vector<TileKey>& removed,
+             const std::set<TileKey>& old = {});
 
   /// Brings the grid up to date. True: its size or place is another than before, and a rectangle of
   /// before means nothing any more; changed_rectangle() is empty then.
@@ -60,13 +65,18 @@ class OccupancyProjection {
   using Tower = std::pair<std::int32_t, std::int32_t>;  // x, y of the tiles above one another
   using Cells = std::array<std::int8_t, kTileSide * kTileSide>;
 
+  struct Layer {
+    Cells cells;
+    bool old = false;
+  };
+
   Cells project(const MapTile& tile) const;
   Cells top_view(const Tower& tower) const;
   bool grow();
   void paste(const Tower& tower, const Cells& cells);
 
   const OccupancyOptions options_;
-  std::map<Tower, std::map<std::int32_t, Cells>> towers_;  // by z
+  std::map<Tower, std::map<std::int32_t, Layer>> towers_;  // by z
   std::set<Tower> dirty_;
   // Of all towers ever, as long as that is not too large; none at first.
   Tower low_{0, 0}, high_{-1, -1};

@@ -67,7 +67,14 @@ visualization_msgs::msg::MarkerArray marker_array(const ObjectsById& objects,
     marker.color().r(1.0f - stationarity);
     marker.color().g(stationarity);
     marker.color().b(0.2f);
-    marker.color().a(0.6f);
+    if (object.seen_in_run) {
+      marker.color().a(0.6f);
+    } else {  // known from before, and not looked at since
+      marker.color().r(0.5f);
+      marker.color().g(0.5f);
+      marker.color().b(0.5f);
+      marker.color().a(0.3f);
+    }
   }
   return array;
 }

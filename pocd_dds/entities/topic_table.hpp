@@ -87,6 +87,16 @@ inline constexpr TopicSpec kSnapshotRequest{"pocd/map/snapshot_request",
 inline constexpr TopicSpec kSnapshotReply{"pocd/map/snapshot_reply",
                                           "pocd_msgs::msg::dds_::MapSnapshotReply_",
                                           Direction::kBoth, false, reliable(1000)};
+inline constexpr TopicSpec kEventsRequest{"pocd/events_request",
+                                          "pocd_msgs::msg::dds_::EventsRequest_", Direction::kBoth,
+                                          false, reliable(10)};
+inline constexpr TopicSpec kEventsReply{"pocd/events_reply", "pocd_msgs::msg::dds_::EventsReply_",
+                                        Direction::kBoth, false, reliable(100)};
+inline constexpr TopicSpec kCommand{"pocd/command", "pocd_msgs::msg::dds_::Command_",
+                                    Direction::kBoth, false, reliable(100)};
+inline constexpr TopicSpec kCommandReply{"pocd/command_reply",
+                                         "pocd_msgs::msg::dds_::CommandReply_", Direction::kBoth,
+                                         false, reliable(100)};
 inline constexpr TopicSpec kHealth{"pocd/health",
                                    "pocd_msgs::msg::dds_::NodeHealth_",
                                    Direction::kOut,

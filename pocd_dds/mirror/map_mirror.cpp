@@ -92,6 +92,13 @@ struct MapMirror::Impl {
   void take_deltas();
   void take_replies();
   void forget_objects_of(std::uint64_t epoch);
+  /// Objects of the run before, of the same lineage, stay until the present one has told all it
+  /// knows.
+  void settle_objects();
+  bool is_ours(const msg::ObjectState& object) const {
+    return !manifest || object.epoch() == manifest->epoch() ||
+           object.lineage() == manifest->lineage();
+  }
   void take_tiles();
   void catch_up();
   void count_damaged();
@@ -121,6 +128,7 @@ struct MapMirror::Impl {
   MapFollower follower;
   dds::Publishers publishers;
   std::optional<msg::MapManifest> manifest;
+  dds::SampleMeta::Guid manifest_writer{};
   std::map<std::array<std::uint8_t, 16>, msg::ObjectState> objects;
   dds::PartAssembler<std::pair<std::uint64_t, std::uint64_t>, msg::MapDelta> delta_parts;
   dds::PartAssembler<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>, msg::MapSnapshotReply>
@@ -152,7 +160,12 @@ void MapMirror::Impl::turn() {
 void MapMirror::Impl::take_objects() {
   object_states.take_some(kMost, [&](const msg::ObjectState& state, const dds::SampleMeta& meta) {
     if (meta.valid) {
-      if (state.map_id() == options.map_id) objects[state.uuid()] = state;
+      if (state.map_id() != options.map_id) return;
+      if (state.forgotten()) {
+        objects.erase(state.uuid());
+      } else {
+        objects[state.uuid()] = state;
+      }
     } else if (meta.disposed) {
       objects.erase(meta.key);
     }
@@ -162,6 +175,18 @@ void MapMirror::Impl::take_objects() {
 void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
   for (auto object = objects.begin(); object != objects.end();) {
     object = object->second.epoch() == epoch ? objects.erase(object) : std::next(object);
+  }
+}
+
+void MapMirror::Impl::settle_objects() {
+  if (!manifest) return;
+  std::size_t told = 0;
+  for (const auto& entry : objects) told += entry.second.epoch() == manifest->epoch();
+  if (told == objects.size() || told < manifest->object_count()) return;
+  for (auto object = objects.begin(); object != objects.end();) {
+    const bool before = object->second.lineage() == manifest->lineage() &&
+                        object->second.epoch() != manifest->epoch();
+    object = before ? objects.erase(object) : std::next(object);
   }
 }
 
@@ -180,8 +205,15 @@ void MapMirror::Impl::take_manifests() {
     if (!publishers.heard(meta.writer, message.epoch(), message.final_version(), Clock::now())) {
       return;
     }
+    // A run has one writer as long as it lives.
+    if (manifest && manifest->epoch() == message.epoch() && meta.writer != manifest_writer) {
+      problems.count(manifests.topic(), "epoch_reused",
+                     "epoch " + std::to_string(message.epoch()) + " names two runs", 1);
+      follower.forget();
+    }
+    manifest_writer = meta.writer;
     if (manifest && manifest->epoch() != message.epoch()) {
-      forget_objects_of(manifest->epoch());
+      if (manifest->lineage() != message.lineage()) forget_objects_of(manifest->epoch());
       const auto of_this_run = [&](const auto& key) { return std::get<0>(key) == message.epoch(); };
       delta_parts.keep(of_this_run);
       reply_parts.keep(of_this_run);
@@ -189,6 +221,7 @@ void MapMirror::Impl::take_manifests() {
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
   });
+  settle_objects();
   publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },
                          Clock::now());
 }
@@ -319,7 +352,7 @@ MirrorStatus MapMirror::Impl::status_now() const {
   status.digest = replica.digest();
   status.tiles = replica.tiles().size();
   for (const auto& [key, object] : objects) {
-    status.objects += !manifest || object.epoch() == manifest->epoch();
+    status.objects += is_ours(object);
   }
   status.publisher_present = publishers.present();
   status.publisher_seen = publishers.followed().has_value();
@@ -362,7 +395,7 @@ MirrorContents MapMirror::contents() const {
     contents.frame_id = impl_->manifest->frame_id();
   }
   for (const auto& [key, state] : impl_->objects) {
-    if (impl_->manifest && state.epoch() != impl_->manifest->epoch()) continue;
+    if (!impl_->is_ours(state)) continue;
     contents.objects.push_back(dds::object_from(state));
     contents.class_names[state.class_id()] = state.class_name();
   }

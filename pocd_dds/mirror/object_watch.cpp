@@ -59,6 +59,8 @@ struct ObjectWatch::Impl {
   void take_events();
   void take_manifests();
   void forget_replaced();
+  /// A run of this lineage goes on and has not told of all its objects yet.
+  bool may_still_come(std::uint64_t lineage) const;
   void gone(const std::array<std::uint8_t, 16>& uuid, Gone why);
 
   struct Known {
@@ -72,8 +74,13 @@ struct ObjectWatch::Impl {
   dds::Reader<pocd_msgs::msg::ObjectEventPubSubType> events;
   std::map<std::array<std::uint8_t, 16>, Known> known;
   dds::Reader<pocd_msgs::msg::MapManifestPubSubType> manifests;
-  mutable std::mutex mutex;                    // guards publishers and counts
-  std::set<dds::SampleMeta::Guid> publishers;  // writers of this map's manifest, of runs that go on
+  mutable std::mutex mutex;  // guards publishers and counts
+  struct Publisher {
+    std::uint64_t epoch = 0, lineage = 0;
+    std::size_t objects = 0;
+  };
+  /// By writer of this map's manifest, of runs that go on. Only the thread changes it.
+  std::map<dds::SampleMeta::Guid, Publisher> publishers;
   std::pair<int, int> matched_before{0, 0};
   dds::ProblemCounter problems;  // tells of the first
   std::uint64_t too_many = 0;
@@ -106,13 +113,15 @@ void ObjectWatch::Impl::take_states() {
     if (meta.disposed) gone(meta.key, Gone::kRemoved);
     // Not valid and not disposed: its node has gone, which says nothing about the object.
     if (!meta.valid || state.map_id() != options.map_id) return;
+    if (state.forgotten()) return gone(state.uuid(), Gone::kForgotten);
     if (known.size() >= options.most_objects && known.count(state.uuid()) == 0) {
       if (too_many++ == 0) tell("more than most_objects are on the bus (said once, counted)");
       return;
     }
     taken = true;
     Known& entry = known[state.uuid()];
-    entry = {{state.uuid(), state.epoch(), state.class_name(), dds::object_from(state)},
+    entry = {{state.uuid(), state.epoch(), state.lineage(), state.class_name(),
+              dds::object_from(state)},
              meta.writer};
     if (!options.on_object) return;
     callbacks.call([this, object = entry.object] { options.on_object(object); });
@@ -123,13 +132,28 @@ void ObjectWatch::Impl::take_states() {
   matched_before = matched;
 }
 
+bool ObjectWatch::Impl::may_still_come(std::uint64_t lineage) const {
+  for (const auto& [writer, publisher] : publishers) {
+    if (publisher.lineage != lineage || !manifests.has_writer(writer)) continue;
+    std::size_t told = 0;
+    for (const auto& entry : known) told += entry.second.object.epoch == publisher.epoch;
+    return told < publisher.objects;
+  }
+  // Its objects may be heard before its manifest.
+  return std::any_of(known.begin(), known.end(), [&](const auto& entry) {
+    return entry.second.object.lineage == lineage && states.has_writer(entry.second.writer);
+  });
+}
+
 void ObjectWatch::Impl::forget_replaced() {
   std::vector<std::array<std::uint8_t, 16>> orphans;
   for (const auto& [uuid, entry] : known) {
     if (!states.has_writer(entry.writer)) orphans.push_back(uuid);
   }
   if (orphans.size() == known.size()) return;  // no run that goes on
-  for (const auto& uuid : orphans) gone(uuid, Gone::kReplaced);
+  for (const auto& uuid : orphans) {
+    if (!may_still_come(known.at(uuid).object.lineage)) gone(uuid, Gone::kReplaced);
+  }
 }
 
 void ObjectWatch::Impl::gone(const std::array<std::uint8_t, 16>& uuid, Gone why) {
@@ -151,18 +175,21 @@ void ObjectWatch::Impl::take_events() {
 }
 
 void ObjectWatch::Impl::take_manifests() {
+  bool heard = false;
   manifests.take_some(kMost, [&](const auto& message, const dds::SampleMeta& meta) {
     if (!meta.valid || message.map_id() != options.map_id) return;
+    heard = true;
     const std::lock_guard<std::mutex> lock(mutex);
     for (auto writer = publishers.begin(); writer != publishers.end();) {
-      writer = manifests.has_writer(*writer) ? std::next(writer) : publishers.erase(writer);
+      writer = manifests.has_writer(writer->first) ? std::next(writer) : publishers.erase(writer);
     }
     if (message.final_version()) {
       publishers.erase(meta.writer);
     } else {
-      publishers.insert(meta.writer);
+      publishers[meta.writer] = {message.epoch(), message.lineage(), message.object_count()};
     }
   });
+  if (heard) forget_replaced();
 }
 
 ObjectWatch::ObjectWatch(const ObjectWatchOptions& options)
@@ -172,7 +199,7 @@ ObjectWatch::~ObjectWatch() = default;
 bool ObjectWatch::publisher_present() const {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   return std::any_of(impl_->publishers.begin(), impl_->publishers.end(),
-                     [&](const auto& writer) { return impl_->manifests.has_writer(writer); });
+                     [&](const auto& entry) { return impl_->manifests.has_writer(entry.first); });
 }
 
 WatchStatus ObjectWatch::status() const {

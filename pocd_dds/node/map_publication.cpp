@@ -30,9 +30,11 @@ std::size_t network_bytes(std::size_t payload, const RawWriter& writer) {
 }  // namespace
 
 MapPublication::MapPublication(const std::shared_ptr<Participant>& participant,
-                               const NodeFile& config, std::uint64_t epoch, Wakeup& wakeup)
+                               const NodeFile& config, std::uint64_t epoch, Wakeup& wakeup,
+                               std::uint64_t lineage)
     : config_(config),
       map_id_(static_cast<std::uint32_t>(config.node.map_id)),
+      lineage_(lineage != 0 ? lineage : epoch),
       wakeup_(wakeup),
       tiles_(participant, topics::kMapTiles),
       deltas_(participant, topics::kMapDeltas),
@@ -41,6 +43,31 @@ MapPublication::MapPublication(const std::shared_ptr<Participant>& participant,
       requests_(participant, topics::kSnapshotRequest, wakeup),
       publisher_(epoch, config.pipeline.map),
       budget_(1e6 * config.node.map_rate_mb_s) {}
+
+void MapPublication::restored(StampNs stamp_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const auto& [key, tile] : publisher_.tiles()) {
+    kept_waiting_.push_back(key);
+    changed_.insert(key);
+    not_looked_.insert(region_of(key));
+  }
+  stamp_ns_ = stamp_ns;
+  announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size(), stamp_ns};
+}
+
+void MapPublication::looked_at(const std::vector<BlockKey>& regions) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (not_looked_.empty()) return;
+  for (const BlockKey& region : regions) {
+    if (not_looked_.erase(region) == 0) continue;
+    constexpr std::int32_t kTiles = (1 << BlockKey::kRegionShift) / 2;  // along a side
+    for (std::int32_t i = 0; i < kTiles * kTiles * kTiles; ++i) {
+      const TileKey key{region.x * kTiles + i % kTiles, region.y * kTiles + i / kTiles % kTiles,
+                        region.z * kTiles + i / kTiles / kTiles};
+      if (publisher_.tiles().count(key) > 0) changed_.insert(key);
+    }
+  }
+}
 
 bool MapPublication::begin_step(bool now) {
   const auto time = std::chrono::steady_clock::now();
@@ -99,8 +126,9 @@ bool MapPublication::send_delta() {
 
 bool MapPublication::send_tile() {
   std::unique_lock<std::mutex> lock(mutex_);
-  if (tiles_waiting_.empty()) return false;
-  const TileKey key = tiles_waiting_.front();
+  std::deque<TileKey>& queue = tiles_waiting_.empty() ? kept_waiting_ : tiles_waiting_;
+  if (queue.empty()) return false;
+  const TileKey key = queue.front();
   const auto known = publisher_.tiles().find(key);
   const bool present = known != publisher_.tiles().end();
   const MapTile tile = present ? known->second : MapTile{key, 0, {}};
@@ -117,7 +145,7 @@ bool MapPublication::send_tile() {
   step_bytes_ += tile.payload.size();
   budget_.spend(network_bytes(tile.payload.size(), tiles_));
   lock.lock();
-  tiles_waiting_.pop_front();
+  queue.pop_front();  // only this thread takes from it
   return true;
 }
 
@@ -133,10 +161,12 @@ bool MapPublication::send_reply() {
   return true;
 }
 
-void MapPublication::send_manifest(std::size_t objects, bool final_version) {
+void MapPublication::send_manifest(std::size_t objects, bool final_version,
+                                   const MemoryStatus& kept) {
   pocd_msgs::msg::MapManifest manifest;
   manifest.map_id(map_id_);
   manifest.epoch(publisher_.epoch());
+  manifest.lineage(lineage_);
   manifest.version(announced_.version);
   manifest.stamp(to_time(announced_.stamp_ns));
   manifest.frame_id(config_.node.map_frame);
@@ -147,6 +177,8 @@ void MapPublication::send_manifest(std::size_t objects, bool final_version) {
   manifest.object_count(static_cast<std::uint32_t>(objects));
   manifest.digest(digest_message(announced_.digest));
   manifest.final_version(final_version);
+  manifest.stored_version(kept.stored_version);
+  manifest.stored_seq(kept.stored_event);
   manifest_.write(manifest);
 }
 
@@ -186,7 +218,7 @@ void MapPublication::count_problems(ProblemCounter& problems) {
 
 std::size_t MapPublication::waiting() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::size_t messages = tiles_waiting_.size() + (reply_waiting_ ? reply_waiting_->left() : 0);
+  std::size_t messages = tiles_waiting_.size() + kept_waiting_.size() + (reply_waiting_ ? reply_waiting_->left() : 0);
   for (const DeltaParts& step : deltas_waiting_) messages += step.left();
   return messages;
 }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "pocd/config/node_config.hpp"
+#include "pocd/memory/warehouse_memory.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
@@ -27,9 +28,19 @@ namespace pocd::dds {
 /// writes to the bus while the other has to wait for it.
 class MapPublication {
  public:
-  /// `wakeup` is woken by requests for snapshots and by new steps, and must outlive it.
+  /// `wakeup` is woken by requests for snapshots and by new steps, and must outlive it. `lineage` is
+  /// that of the memory; 0: the epoch, without one.
   MapPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
-                 std::uint64_t epoch, Wakeup& wakeup);
+                 std::uint64_t epoch, Wakeup& wakeup, std::uint64_t lineage = 0);
+
+  /// Goes on from what another run has published: publisher() has been restored. Before all others.
+  void restored(StampNs stamp_ns);
+  /// The thread that changes the map: regions that were looked at in this run.
+  void looked_at(const std::vector<BlockKey>& regions);
+  /// Regions from before this run that were not looked at since; while hold() is held.
+  const std::set<BlockKey>& not_looked() const { return not_looked_; }
+  /// To be restored.
+  MapPublisher& publisher_to_restore() { return publisher_; }
 
   // The thread that changes the map:
 
@@ -47,7 +58,7 @@ class MapPublication {
   /// One reply for all that wait, when the one before has arrived.
   void answer_requests();
   /// What the map is, as far as its deltas have left; `final_version` at the end of a run.
-  void send_manifest(std::size_t objects, bool final_version);
+  void send_manifest(std::size_t objects, bool final_version, const MemoryStatus& kept = {});
   /// What of the requests could not be heard or read.
   void count_problems(ProblemCounter& problems);
   /// Messages that are to be sent.
@@ -82,6 +93,7 @@ class MapPublication {
 
   const NodeFile config_;
   const std::uint32_t map_id_;
+  const std::uint64_t lineage_;
   Wakeup& wakeup_;
   Writer<pocd_msgs::msg::MapTilePubSubType> tiles_;
   Writer<pocd_msgs::msg::MapDeltaPubSubType> deltas_;
@@ -97,7 +109,9 @@ class MapPublication {
   StampNs stamp_ns_ = 0;
   std::deque<DeltaParts> deltas_waiting_;
   std::deque<TileKey> tiles_waiting_;  // what they are is looked up when they leave
+  std::deque<TileKey> kept_waiting_;   // tiles from before this run: after all others
   std::set<TileKey> changed_;
+  std::set<BlockKey> not_looked_;
 
   // Only the thread that sends.
   Announced announced_;

@@ -12,9 +12,12 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
+#include "pocd_dds/node/command_desk.hpp"
+#include "pocd_dds/node/event_feed.hpp"
 #include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/latency_log.hpp"
 #include "pocd_dds/node/map_publication.hpp"
+#include "pocd_dds/node/node_memory.hpp"
 #include "pocd_dds/node/object_publication.hpp"
 #include "pocd_dds/node/rival_watch.hpp"
 #include "pocd_dds/node/ros_outputs.hpp"
@@ -42,6 +45,7 @@ struct Node::Impl {
         on_status(options.on_status),
         participant(std::make_shared<Participant>(watched(options.bus, watch))),
         pipeline(config.pipeline),
+        keeper(config),
         latency(options.latency_file),
         queue(static_cast<std::size_t>(config.node.queue_frames)),
         outputs(participant, config, options.epoch),
@@ -49,8 +53,17 @@ struct Node::Impl {
         rivals(participant, {static_cast<std::uint32_t>(config.node.map_id), options.epoch},
                wakeup),
         frames(participant, options.epoch),
-        objects(participant, config, options.epoch),
-        map(participant, config, options.epoch, wakeup),
+        objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
+        map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
+        feed(keeper.on() ? std::make_unique<EventFeed>(participant, config, wakeup) : nullptr),
+        desk(config.node.commands
+                 ? std::make_unique<CommandDesk>(
+                       participant,
+                       MapRun{static_cast<std::uint32_t>(config.node.map_id), options.epoch,
+                              keeper.lineage(options.epoch)},
+                       wakeup)
+                 : nullptr),
+        restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
         health(config.node.health_window_s, config.node.stall_s),
         intake(participant, config.node, config.pipeline, watch, queue, latency),
@@ -72,12 +85,15 @@ struct Node::Impl {
   void draw();
   static void stop(std::atomic<bool>& over, Wakeup& wakeup, std::thread& thread);
   void process(const Frame& frame);
+  /// Does what operators have said meanwhile; true when something was done.
+  bool follow_words();
   void publish(bool now);
   /// What is wrong on the bus beside the robots' topics.
   void add_problems(IntakeStatus& input);
   NodeState judge(const IntakeStatus& input, const WorkStatus& work, const std::string& word);
   void send_status(const std::string& word);
   void send_outputs(bool last);
+  void answer_words();
   void turn();
   bool finish();
 
@@ -86,6 +102,7 @@ struct Node::Impl {
   BusWatch watch;  // outlives the participant
   const std::shared_ptr<Participant> participant;
   PocdPipeline pipeline;  // worker only
+  NodeMemory keeper;      // worker only, but for its status
   LatencyLog latency;
   FrameQueue queue;
   Wakeup wakeup;
@@ -115,11 +132,14 @@ struct Node::Impl {
   ObjectPublication objects;
   MapPublication map;
   Pulse worker_pulse, teller_pulse;
+  std::unique_ptr<EventFeed> feed;    // run()'s thread only; null without a memory
+  std::unique_ptr<CommandDesk> desk;  // guards itself; null without node.commands
   WorkStatus counts;
   double busy_ms = 0.0;
   std::uint64_t busy_frames = 0;
   std::exception_ptr failure;
   std::atomic<bool> failed{false}, worked{false};
+  const bool restored;  // before frames come
 
   // run()'s thread only; its writers are made after all others.
   StatusPublication status;
@@ -147,10 +167,11 @@ void Node::Impl::work() {
       intake.room_made();
       process(*frame);
     }
-    publish(false);
+    publish(follow_words());
     worker_pulse.beat();
   }
   publish(true);
+  keeper.finish(pipeline, map.publisher(), counts.stamp_ns);
   worked = true;
   wakeup.wake();
 }
@@ -207,26 +228,52 @@ void Node::Impl::process(const Frame& frame) {
     counts.last_warning = frame.robot + " frame " + std::to_string(frame.sequence) + ": " + warning;
     if (counts.warnings++ == 0) spdlog::warn("{} (more in diagnostics)", counts.last_warning);
   }
+  map.looked_at(pipeline.take_looked_at());
   frames.processed(frame);
   for (const DroppedFrame& dropped : queue.take_dropped()) frames.dropped(dropped);
   objects.add(result, frame.stamp_ns);
+  keeper.add(result);
   counts.memory = pipeline.map().memory_status();
   tellers_wakeup.wake();
+}
+
+bool Node::Impl::follow_words() {
+  bool followed = false;
+  while (desk) {
+    const std::optional<OperatorWord> word = desk->next();
+    if (!word) break;
+    const WordOutcome outcome = pipeline.apply(*word);
+    if (outcome.done) {
+      spdlog::info("{} by {}: {}", to_string(word->kind), word->by, outcome.text);
+      const std::lock_guard<std::mutex> lock(mutex);
+      objects.add(outcome.result, outcome.result.events.back().stamp_ns);
+      keeper.add(outcome.result);
+      keeper.hurry();
+      counts.memory = pipeline.map().memory_status();
+      tellers_wakeup.wake();
+      followed = true;
+    }
+    desk->done(outcome);
+  }
+  return followed;
 }
 
 void Node::Impl::publish(bool now) {
   const double cpu_ms = thread_cpu_ms();
   // Compressed while the others go on; only this thread changes what it reads.
-  const bool step = map.begin_step(now);
+  const bool step = map.begin_step(now || keeper.overdue());
   std::optional<MapDelta> delta;
   if (step) delta = map.make_step(pipeline.map());
-  const std::lock_guard<std::mutex> lock(mutex);
+  std::unique_lock<std::mutex> lock(mutex);
   if (step) {
     map.send_step(std::move(delta), counts.stamp_ns);
     latency.in_step();
   }
   if (map.deltas_written()) latency.written();
   counts.publishing_cpu_ms += thread_cpu_ms() - cpu_ms;
+  const StampNs stamp_ns = counts.stamp_ns;
+  lock.unlock();
+  if (step) keeper.step(pipeline, map.publisher(), stamp_ns);
 }
 
 void Node::Impl::add_problems(IntakeStatus& input) {
@@ -255,6 +302,9 @@ void Node::Impl::add_problems(IntakeStatus& input) {
   rivals.count_problems(problems);
   map.count_problems(problems);
   clock.count_problems(problems);
+  keeper.count_problems(problems);
+  if (feed) feed->count_problems(problems);
+  if (desk) desk->count_problems(problems);
   const auto more = problems.entries();
   input.problems.insert(input.problems.end(), more.begin(), more.end());
 }
@@ -293,12 +343,15 @@ void Node::Impl::send_status(const std::string& word) {
     counts.intake_cpu_ms = input.cpu_ms;
     counts.take_cpu_ms = input.take_cpu_ms;
     counts.process_cpu_ms = process_cpu_ms();
-    counts.write_failures = objects.failures() + map.failures() + frames.failures();
+    counts.write_failures = objects.failures() + map.failures() + frames.failures() +
+                            (feed ? feed->failures() : 0) + (desk ? desk->failures() : 0);
     counts.map = map.traffic();
     counts.objects = objects.count();
+    counts.kept = keeper.on() ? std::make_optional(keeper.status()) : std::nullopt;
     work = counts;
   }
-  map.send_manifest(work.objects, word == "stopped" && map.waiting() == 0);
+  map.send_manifest(work.objects, word == "stopped" && map.waiting() == 0,
+                    work.kept.value_or(MemoryStatus{}));
   const NodeState state = judge(input, work, word);
   failing = state.verdict.level >= 2;
   status.send(input, work, queue.size(), queue.dropped(), state, clock.now_ns());
@@ -312,9 +365,16 @@ void Node::Impl::send_outputs(bool last) {
     const auto held = map.hold();
     const auto held_objects = objects.hold();
     outputs.collect({objects.objects(), objects.touched()},
-                    {map.publisher().tiles(), map.changed()}, counts.stamp_ns, now_ns, last);
+                    {map.publisher().tiles(), map.changed()}, counts.stamp_ns, now_ns, last,
+                    map.not_looked());
   }
   outputs.send();
+}
+
+void Node::Impl::answer_words() {
+  if (!desk) return;
+  desk->take();
+  desk->answer(keeper.on() ? std::make_optional(keeper.status()) : std::nullopt);
 }
 
 void Node::Impl::turn() {
@@ -322,6 +382,8 @@ void Node::Impl::turn() {
   const double cpu_ms = thread_cpu_ms();
   map.answer_requests();
   map.send_waiting();
+  if (feed) feed->answer();
+  answer_words();
   {
     const std::lock_guard<std::mutex> lock(mutex);
     if (map.deltas_written()) latency.written();
@@ -341,6 +403,7 @@ bool Node::Impl::finish() {
   // What is queued may take seconds: subscribers go on to hear of it, and that the node is there.
   while (!worked && !failed) turn();
   worker.join();
+  answer_words();
   stop(told, tellers_wakeup, teller);
   stop(drawn, outputs_wakeup, drawer);
   if (failure) std::rethrow_exception(failure);

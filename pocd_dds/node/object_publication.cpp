@@ -5,10 +5,11 @@
 namespace pocd::dds {
 
 ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& participant,
-                                     const NodeFile& config, std::uint64_t epoch)
+                                     const NodeFile& config, std::uint64_t epoch,
+                                     std::uint64_t lineage)
     : node_(config.node),
       classes_(config.pipeline.classes),
-      run_{static_cast<std::uint32_t>(config.node.map_id), epoch},
+      run_{static_cast<std::uint32_t>(config.node.map_id), epoch, lineage},
       states_(participant, topics::kObjects),
       events_(participant, topics::kObjectEvents) {}
 
@@ -21,11 +22,25 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
     events_waiting_.push_back(event);
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
-    objects_[object.id] = object;
+    ObjectSnapshot& known = objects_[object.id] = object;
+    known.seen_in_run = !known_until_ns_ || object.last_seen_ns > *known_until_ns_;
     changed_.insert(object.id);
     touched_.insert(object.id);
   }
+  std::set<ObjectId> forgotten;
+  for (const ObjectEvent& event : result.events) {
+    if (event.kind == EventKind::kOperator) forgotten.insert(event.object);
+  }
   for (const ObjectId id : result.retired) {
+    const auto known = objects_.find(id);
+    if (known != objects_.end() && forgotten.count(id) > 0) {
+      forgotten_.push_back(std::move(known->second));
+      forgotten_.back().forgotten = true;
+      objects_.erase(known);
+      changed_.erase(id);
+      touched_.insert(id);
+      continue;
+    }
     objects_.erase(id);
     changed_.erase(id);
     touched_.insert(id);
@@ -45,6 +60,13 @@ void ObjectPublication::send_events() {
   }
 }
 
+void ObjectPublication::restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns) {
+  known_until_ns_ = stamp_ns;
+  FrameResult known;
+  known.changed_objects = objects;
+  add(known, stamp_ns);
+}
+
 void ObjectPublication::dispose_gone() {
   std::set<ObjectId> gone;
   {
@@ -54,13 +76,38 @@ void ObjectPublication::dispose_gone() {
   for (const ObjectId id : gone) {
     if (published_.count(id) == 0) continue;  // nobody has heard of it
     pocd_msgs::msg::ObjectState state;
-    state.uuid(object_uuid(run_.epoch, id));
+    state.uuid(object_uuid(run_.names(), id));
     if (states_.dispose(state)) {
       published_.erase(id);
       continue;
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     gone_.insert(id);
+  }
+}
+
+void ObjectPublication::send_forgotten() {
+  const auto time = std::chrono::steady_clock::now();
+  std::vector<ObjectSnapshot> forgotten;
+  StampNs stamp_ns = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    forgotten.swap(forgotten_);
+    stamp_ns = stamp_ns_;
+    while (!said_forgotten_.empty() && time - said_forgotten_.front().second > kForgottenStays) {
+      gone_.insert(said_forgotten_.front().first);
+      said_forgotten_.pop_front();
+    }
+  }
+  for (ObjectSnapshot& object : forgotten) {
+    auto message = object_message(object, run_, classes_, stamp_ns, node_.map_frame);
+    if (states_.write(message)) {
+      published_.insert(object.id);
+      said_forgotten_.emplace_back(object.id, time);
+      continue;
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    forgotten_.push_back(std::move(object));
   }
 }
 
@@ -95,6 +142,7 @@ bool ObjectPublication::send_state(ObjectId id) {
 void ObjectPublication::send_due(bool now) {
   send_events();
   // What Fast DDS refuses, because the writer is full, is tried again next time.
+  send_forgotten();
   dispose_gone();
   for (const ObjectId id : take_due(now)) {
     if (send_state(id)) continue;

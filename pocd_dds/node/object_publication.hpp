@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "pocd/config/node_config.hpp"
@@ -22,10 +23,12 @@ namespace pocd::dds {
 class ObjectPublication {
  public:
   ObjectPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
-                    std::uint64_t epoch);
+                    std::uint64_t epoch, std::uint64_t lineage = 0);
 
   // The thread of the pipeline:
 
+  /// Objects that are known from before; once, before all others.
+  void restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns);
   void add(const FrameResult& result, StampNs stamp_ns);
 
   // The thread that writes:
@@ -56,9 +59,13 @@ class ObjectPublication {
 
  private:
   static constexpr std::size_t kMostEvents = 10000;
+  static constexpr std::chrono::seconds kForgottenStays{5};
 
   void send_events();
   void dispose_gone();
+  /// What an operator had forgotten: said in a last state, which has time to arrive before the
+  /// object is disposed.
+  void send_forgotten();
   /// Ids of objects whose state is to be written now.
   std::vector<ObjectId> take_due(bool now);
   bool send_state(ObjectId id);
@@ -72,13 +79,16 @@ class ObjectPublication {
   // Only the thread that writes.
   std::set<ObjectId> published_;
   std::chrono::steady_clock::time_point last_sent_{};
+  std::deque<std::pair<ObjectId, std::chrono::steady_clock::time_point>> said_forgotten_;
 
   mutable std::mutex mutex_;  // guards what follows, and is not held while something is written
   std::map<ObjectId, ObjectSnapshot> objects_;
   std::set<ObjectId> changed_, gone_, touched_;
+  std::vector<ObjectSnapshot> forgotten_;  // with their last state
   std::deque<ObjectEvent> events_waiting_;
   std::uint64_t dropped_events_ = 0;
   StampNs stamp_ns_ = 0;
+  std::optional<StampNs> known_until_ns_;  // from the memory; later sights are of this run
 };
 
 }  // namespace pocd::dds

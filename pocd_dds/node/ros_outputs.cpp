@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "pocd/map/birdseye.hpp"
+#include "pocd_dds/bridge/map_messages.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -20,7 +21,8 @@ std::string source_of(std::uint64_t epoch) {
 
 OccupancyOptions occupancy_options(const NodeFile& config) {
   return {config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m(),
-          config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m};
+          config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m,
+          config.node.outputs.occupancy_not_looked_at};
 }
 
 /// rt/pocd/map in another namespace; what several nodes may share stays.
@@ -69,14 +71,17 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
   make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
 }
 
-void RosOutputs::copy_tiles(const Changes<TileKey, MapTile>& tiles) {
+void RosOutputs::copy_tiles(const Changes<TileKey, MapTile>& tiles,
+                            const std::set<BlockKey>& not_looked) {
   const auto note = [&](const TileKey& key, bool present) {
     if (grid_) grid_steps_[key] = present;
     if (surface_) surface_steps_[key] = present;
   };
   for (const TileKey& key : tiles.keys) {
     const auto tile = tiles.all.find(key);
+    old_tiles_.erase(key);
     if (tile != tiles.all.end()) {
+      if (grid_ && not_looked.count(region_of(key)) > 0) old_tiles_.insert(key);
       tiles_[key] = tile->second;
       note(key, true);
     } else if (tiles_.erase(key) > 0) {
@@ -88,7 +93,7 @@ void RosOutputs::copy_tiles(const Changes<TileKey, MapTile>& tiles) {
 
 void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
                          const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns,
-                         bool last) {
+                         bool last, const std::set<BlockKey>& not_looked) {
   // A topic without any reader is not worked for; who comes later gets it at the next period.
   markers_due_ = markers_ && (markers_pace_.due(now_ns) || last);
   const bool room = budget_.open(std::chrono::steady_clock::now());
@@ -110,7 +115,7 @@ void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
     }
     objects.keys.clear();
   }
-  if (occupancy_due_ || surface_due_) copy_tiles(tiles);
+  if (occupancy_due_ || surface_due_) copy_tiles(tiles, not_looked);
   // What no output needs must not grow for ever.
   if (!markers_ && !obstacles_ && !surface_) objects.keys.clear();
   if (!grid_ && !surface_) tiles.keys.clear();
@@ -177,7 +182,7 @@ void RosOutputs::send_occupancy() {
   const Keys keys = split(grid_steps_);
   std::vector<MapTile> changed;
   for (const TileKey& key : keys.changed) changed.push_back(tiles_.at(key));
-  projection_.apply(changed, keys.removed);
+  projection_.apply(changed, keys.removed, old_tiles_);
   const bool was_too_large = projection_.too_large();
   const bool resized = projection_.update();
   grid_too_large_ = projection_.too_large();

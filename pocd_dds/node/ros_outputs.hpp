@@ -37,9 +37,11 @@ class RosOutputs {
     std::set<Key>& keys;
   };
   /// Copies what has changed and the outputs that are due need, and empties the sets that it has
-  /// copied; with `last`, the final state for those that keep one.
+  /// copied; with `last`, the final state for those that keep one. `not_looked`: regions of the map
+  /// that are known from before the node started and were not looked at since.
   void collect(const Changes<ObjectId, ObjectSnapshot>& objects,
-               const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns, bool last);
+               const Changes<TileKey, MapTile>& tiles, StampNs stamp_ns, StampNs now_ns, bool last,
+               const std::set<BlockKey>& not_looked = {});
   /// What fails is counted and tried again at its next period; nothing is thrown. A cloud or a grid
   /// is sent when those before it have left at `outputs.rate_mb_s`.
   void send();
@@ -64,7 +66,7 @@ class RosOutputs {
   template <class AnyWriter>
   bool attempt(const std::unique_ptr<AnyWriter>& writer, void (RosOutputs::*send_one)());
   void spend(const RawWriter& writer, std::size_t bytes);
-  void copy_tiles(const Changes<TileKey, MapTile>& tiles);
+  void copy_tiles(const Changes<TileKey, MapTile>& tiles, const std::set<BlockKey>& not_looked);
 
   const NodeFile config_;
   const RosOutputConfig& rates_;
@@ -86,6 +88,7 @@ class RosOutputs {
   // Steps of that copy that the grid and the surface have not taken over yet; true: changed, else
   // removed.
   std::map<TileKey, bool> grid_steps_, surface_steps_;
+  std::set<TileKey> old_tiles_;  // of the grid's steps: not looked at since the start
 
   bool all_markers_anew_ = true;
   Departures marker_departures_, obstacle_departures_;

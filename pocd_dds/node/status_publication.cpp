@@ -50,6 +50,17 @@ void add_memory(diagnostic_msgs::msg::DiagnosticStatus& status, const MapMemoryS
   add(status, "frames over the map memory budget", std::to_string(memory.frames_over_budget));
 }
 
+void add_kept(diagnostic_msgs::msg::DiagnosticStatus& status, const MemoryStatus& kept) {
+  add(status, "memory steps written", std::to_string(kept.steps));
+  add(status, "memory steps not written", std::to_string(kept.failures));
+  add(status, "memory holds map version", std::to_string(kept.stored_version));
+  add(status, "memory holds events to", std::to_string(kept.stored_event));
+  add(status, "memory file [bytes]", std::to_string(kept.file_bytes));
+  add(status, "memory written [bytes]", std::to_string(kept.written_bytes));
+  add(status, "memory last step [ms]", std::to_string(kept.write_ms));
+  if (!kept.problem.empty()) add(status, "memory problem", kept.problem);
+}
+
 std::string fixed(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.1f", value);
@@ -159,6 +170,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   add(node, "frames dropped", std::to_string(dropped));
   add(node, "frames in queue", std::to_string(queued));
   add_memory(node, work.memory);
+  if (work.kept) add_kept(node, *work.kept);
   add(node, "processing [ms per frame]", std::to_string(work.processing_ms));
   add(node, "longest from last image to map delta [ms]", std::to_string(work.latency_ms));
   add(node, "CPU of the pipeline [ms]", std::to_string(work.pipeline_cpu_ms));

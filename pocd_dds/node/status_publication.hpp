@@ -4,10 +4,12 @@
 #include <array>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "diagnostic_msgsPubSubTypes.h"
 #include "pocd/map/map_memory.hpp"
+#include "pocd/memory/warehouse_memory.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/node/health_rule.hpp"
 #include "pocd_dds/node/intake.hpp"
@@ -43,6 +45,7 @@ struct WorkStatus {
   std::uint64_t objects = 0;
   MapTraffic map;
   MapMemoryStatus memory;
+  std::optional<MemoryStatus> kept;  ///< without a value: nothing is kept
   StampNs stamp_ns = 0;  ///< of the last frame
   /// Longest time of the last second from the last image of a frame to its map delta [ms].
   double latency_ms = 0.0;

@@ -48,7 +48,8 @@ void ObjectFeed::object(const WatchedObject& object) {
     other = unknown_.erase(other);
   }
   board_.put_notice("object/" + uuid,
-                    text_of(object_json(object, run_of_locked(object.epoch), "present")));
+                    text_of(object_json(object, run_of_locked(object.epoch),
+                                        object.state.seen_in_run ? "present" : "unknown")));
 }
 
 void ObjectFeed::gone(const WatchedObject& object, Gone why) {
@@ -57,6 +58,10 @@ void ObjectFeed::gone(const WatchedObject& object, Gone why) {
   history_.gone(uuid, last_ns_.value_or(0));
   if (why == Gone::kRemoved) {
     say_gone(object, "removed");
+    return;
+  }
+  if (why == Gone::kForgotten) {
+    say_gone(object, "forgotten");
     return;
   }
   unknown_[uuid] = object;

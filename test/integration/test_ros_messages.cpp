@@ -71,6 +71,30 @@ TEST(OccupancyProjection, BandDecidesBetweenFreeOccupiedAndUnknown) {
   EXPECT_EQ(cell(projection, 6, 0), kCellFree);
 }
 
+TEST(OccupancyProjection, WhatNobodyHasLookedAtForLongHasAValueOfItsOwn) {
+  SmallMap map;
+  map.set(1, 0, -1, 0.02);                          // floor
+  map.set(2, 0, -1, 0.02), map.set(2, 0, 5, 0.02);  // something on the floor
+  const std::optional<MapDelta> all = map.publisher.update(map.map);
+  ASSERT_TRUE(all);
+  std::set<TileKey> old;
+  for (const MapTile& tile : all->changed) old.insert(tile.key);
+  const auto cells = [&](int value, const std::set<TileKey>& not_looked) {
+    OccupancyOptions with_value = options();
+    with_value.not_looked_at = value;
+    OccupancyProjection projection(with_value);
+    projection.apply(all->changed, {}, not_looked);
+    projection.update();
+    return std::vector<int>{cell(projection, 0, 0), cell(projection, 1, 0), cell(projection, 2, 0)};
+  };
+  EXPECT_EQ(cells(kCellUnknown, old), (std::vector<int>{-1, -1, -1}));
+  EXPECT_EQ(cells(50, old), (std::vector<int>{-1, 50, 50})) << "what was unknown stays so";
+  EXPECT_EQ(cells(OccupancyOptions::kAsItWas, old), (std::vector<int>{-1, 0, 100}));
+  EXPECT_EQ(cells(50, {}), (std::vector<int>{-1, 0, 100}));
+  // The floor's tile is looked at, the one above it is not: what stood there may stand there.
+  EXPECT_EQ(cells(50, {TileKey{0, 0, 0}}), (std::vector<int>{-1, 0, 50}));
+}
+
 TEST(OccupancyProjection, UpdateIsTheSmallestRectangle) {
   SmallMap map;
   for (int x = -20; x < 20; ++x) map.set(x, 3, 5, 0.02);

@@ -100,6 +100,9 @@ std::vector<BirdseyeChange> changes_since(const std::vector<ObjectEvent>& events
           known->second.after.reset();
         }
         break;
+      case EventKind::kOperator:
+        if (known != of.end()) of.erase(known);
+        break;
     }
   }
   std::vector<BirdseyeChange> changes;

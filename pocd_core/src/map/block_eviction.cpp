@@ -14,6 +14,8 @@ namespace pocd {
 namespace {
 
 constexpr int kLevel = 1;
+// The list of dirty blocks that those from before this process were in: their end is heard of.
+constexpr std::uint32_t kListBefore = 1;
 constexpr std::size_t kBlockBytes =
     4 + sizeof(VoxelBlock::tsdf) + sizeof(VoxelBlock::weight) + sizeof(VoxelBlock::owner);
 // Nodes, vectors and buckets around an entry of a hash or list, by the layout of libstdc++.
@@ -124,7 +126,46 @@ bool BlockStore::evict_oldest() {
   return true;
 }
 
+void BlockStore::restore(const std::vector<StoredRegion>& regions,
+                         std::shared_ptr<RegionSource> source) {
+  source_ = std::move(source);
+  dirty_list_ = std::max(dirty_list_, kListBefore + 1);
+  for (const StoredRegion& stored : regions) {
+    if (stored.present.none()) continue;
+    const auto [entry, fresh] = regions_.try_emplace(stored.key);
+    POCD_CHECK(fresh);
+    entry->second = std::make_unique<Region>();
+    Region& region = *entry->second;
+    region.key = stored.key;
+    region.present = stored.present;
+    region.stored = true;
+    size_ += stored.present.count();
+    size_on_disk_ += stored.present.count();
+    for (const std::uint32_t owner : stored.owners) {
+      owner_regions_on_disk_[owner].push_back(stored.key);
+      ++owner_entries_;
+    }
+  }
+}
+
+std::vector<std::uint8_t> BlockStore::read_stored(const Region& region) const {
+  const std::vector<VoxelBlock> blocks = source_->read(region.key);
+  std::vector<std::uint8_t> raw(blocks.size() * kBlockBytes);
+  std::size_t n = 0;
+  for (std::uint32_t place = 0; place < kRegionBlocks; ++place) {
+    if (!region.present[place]) continue;
+    if (n == blocks.size() || !(blocks[n].key == region.block_at(place))) break;
+    put_block(blocks[n], kListBefore, &raw[n * kBlockBytes]);
+    ++n;
+  }
+  if (n != blocks.size() || n != region.present.count()) {
+    throw InputError("map: a stored region has other blocks than its index");
+  }
+  return raw;
+}
+
 std::vector<std::uint8_t> BlockStore::read_page(const Region& region) const {
+  if (region.stored) return read_stored(region);
   const std::string source = "map: voxels in \"" + file_->folder() + "\"";
   std::string reason;
   const auto frame = file_->read(region.page, reason);
@@ -145,7 +186,8 @@ void BlockStore::bring_back(Region& region) {
   } catch (const InputError& error) {
     reason = error.what();
   }
-  file_->release(region.page);
+  if (!region.stored) file_->release(region.page);
+  region.stored = false;
   region.memory = std::make_unique<Region::InMemory>();
   ++regions_in_memory_;
   size_on_disk_ -= region.present.count();
@@ -156,8 +198,11 @@ void BlockStore::bring_back(Region& region) {
   }
   for_each_owner(raw, [&](std::uint32_t owner) {
     const auto entry = owner_regions_on_disk_.find(owner);
+    if (entry == owner_regions_on_disk_.end()) return;  // not in the index of a stored region
     std::vector<BlockKey>& keys = entry->second;
-    *std::find(keys.begin(), keys.end(), region.key) = keys.back();
+    const auto at = std::find(keys.begin(), keys.end(), region.key);
+    if (at == keys.end()) return;
+    *at = keys.back();
     keys.pop_back();
     if (keys.empty()) owner_regions_on_disk_.erase(entry);
     --owner_entries_;

@@ -182,6 +182,19 @@ void BlockStore::drop(std::uint32_t slot) {
   if (in.members.empty()) erase(r);
 }
 
+void BlockStore::clear() {
+  if (file_) file_ = std::make_unique<PageFile>(memory_.folder);
+  for (const BlockKey& key : sorted_keys()) list_dirty(key);
+  regions_.clear();
+  last_region_ = newest_ = oldest_ = nullptr;
+  chunks_.clear();
+  free_chunks_.clear();
+  spare_.clear();
+  owner_slots_.clear();
+  owner_regions_on_disk_.clear();
+  size_ = size_on_disk_ = regions_in_memory_ = chunk_count_ = owner_entries_ = 0;
+}
+
 std::vector<BlockKey> BlockStore::sorted_keys() const {
   std::vector<BlockKey> keys;
   keys.reserve(size_);
@@ -282,6 +295,22 @@ std::vector<BlockKey> BlockStore::take_dirty() {
   dirty_.clear();
   dirty_sorted_ = 0;
   ++dirty_list_;  // no block is in the new list, in memory or on disk
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  if (keeps_unsaved_) {
+    unsaved_.insert(unsaved_.end(), keys.begin(), keys.end());
+    if (unsaved_.size() > unsaved_limit_) {
+      std::sort(unsaved_.begin(), unsaved_.end());
+      unsaved_.erase(std::unique(unsaved_.begin(), unsaved_.end()), unsaved_.end());
+      unsaved_limit_ = std::max(unsaved_limit_, 2 * unsaved_.size());
+    }
+  }
+  return keys;
+}
+
+std::vector<BlockKey> BlockStore::take_unsaved() {
+  std::vector<BlockKey> keys = std::move(unsaved_);
+  unsaved_.clear();
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   return keys;

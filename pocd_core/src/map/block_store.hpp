@@ -14,6 +14,7 @@
 
 #include "page_file.hpp"
 #include "pocd/map/map_memory.hpp"
+#include "pocd/map/region_source.hpp"
 #include "pocd/map/voxel_block.hpp"
 
 namespace pocd {
@@ -80,11 +81,23 @@ class BlockStore {
   /// Brings those on disk back.
   std::vector<std::uint32_t> take_owner(std::uint32_t owner);
 
+  /// Nothing is there any more; all blocks that were are dirty. Throws InputError, with nothing
+  /// changed, when there is no new file for evicted regions.
+  void clear();
+
   /// Dirty blocks are listed once. drop() lists a block that was ever dirty. The list is at most
   /// twice as long as there are places in it, and a little.
   void mark_dirty(std::uint32_t slot);
   /// Canonical order; clears the list.
   std::vector<BlockKey> take_dirty();
+
+  /// From now on take_unsaved() gives what take_dirty() has given, since its own last call.
+  void keep_unsaved() { keeps_unsaved_ = true; }
+  std::vector<BlockKey> take_unsaved();
+
+  /// Regions that are read from `source` when they are entered. Only for a store that has none of
+  /// them.
+  void restore(const std::vector<StoredRegion>& regions, std::shared_ptr<RegionSource> source);
 
   /// The blocks of a region on disk, in the order of their bits in Region::present. Throws
   /// InputError when they cannot be read.
@@ -137,6 +150,7 @@ class BlockStore {
   bool evict_oldest();
   void bring_back(Region& region);
   std::vector<std::uint8_t> read_page(const Region& region) const;
+  std::vector<std::uint8_t> read_stored(const Region& region) const;
   void lose(Region& region, const std::string& reason);
 
   MapMemoryConfig memory_;
@@ -156,6 +170,10 @@ class BlockStore {
   std::vector<BlockKey> dirty_;
   std::size_t dirty_sorted_ = 0;  ///< length of dirty_ when it was sorted out last
   std::uint32_t dirty_list_ = 1;
+  bool keeps_unsaved_ = false;
+  std::vector<BlockKey> unsaved_;
+  std::size_t unsaved_limit_ = 1 << 16;  // repetitions are dropped when there are more
+  std::shared_ptr<const RegionSource> source_;
 
   std::size_t size_ = 0, size_on_disk_ = 0;
   std::size_t regions_in_memory_ = 0, chunk_count_ = 0, owner_entries_ = 0;

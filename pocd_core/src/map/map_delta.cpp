@@ -120,6 +120,21 @@ std::optional<MapDelta> MapPublisher::make_step(TsdfMap& map) const {
   return delta;
 }
 
+void MapPublisher::restore(std::uint64_t version, const MapDigest& digest,
+                           std::vector<MapTile> tiles) {
+  POCD_CHECK(version_ == 0 && tiles_.empty() && version > 0);
+  MapDelta all;
+  all.epoch = epoch_;
+  all.version = version;
+  for (const MapTile& tile : tiles) add(all.digest, tile_digest(tile.key, tile.payload));
+  if (all.digest != digest) {
+    throw InputError("published tiles have digest " + all.digest.hex() + ", noted is " +
+                     digest.hex());
+  }
+  all.changed = std::move(tiles);
+  take_over(all);
+}
+
 void MapPublisher::take_over(const MapDelta& step) {
   POCD_CHECK(step.epoch == epoch_ && step.base_version == version_);
   for (const TileKey& key : step.removed) {

@@ -58,6 +58,16 @@ void MapFollower::published(std::uint64_t epoch, std::uint64_t version, const Ma
   apply_recent();
 }
 
+void MapFollower::forget() {
+  const bool gathering = gathering_;
+  replica_ = MapReplica();
+  recent_.clear();
+  gathered_ = std::make_unique<Gatherings>();
+  published_epoch_.reset();
+  gap_ = false;
+  gathering_ = gathering;
+}
+
 void MapFollower::delta(MapDelta delta) {
   ++counts_.deltas;
   const std::uint64_t epoch = delta.epoch;

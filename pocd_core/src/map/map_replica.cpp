@@ -49,6 +49,10 @@ DeltaOutcome MapReplica::apply(const MapDelta& delta) {
 void MapReplica::note_published(std::uint64_t epoch, std::uint64_t version,
                                 const MapDigest& digest) {
   if (!epoch_) epoch_ = epoch;
+  if (epoch != *epoch_ && !corrupt_ && version > 0 && version == version_ && digest == digest_) {
+    epoch_ = epoch;
+    newest_ = other_epoch_ == epoch ? other_newest_ : 0;
+  }
   if (epoch == *epoch_) other_epoch_.reset();  // the publisher has the last word on its run
   hear(epoch, version);
   if (epoch == *epoch_ && version == version_ && digest != digest_) corrupt_ = true;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pocd/common/check.hpp"
 
@@ -16,11 +17,13 @@ std::int32_t cell_of(double v) { return static_cast<std::int32_t>(std::floor(v /
 
 LibraryObject& ObjectLibrary::create(double spacing_m) {
   const ObjectId id{next_id_++};
+  touch(id);
   return *objects_.emplace(id, std::make_unique<LibraryObject>(id, spacing_m)).first->second;
 }
 
 LibraryObject* ObjectLibrary::find(ObjectId id) {
   const auto it = objects_.find(id);
+  if (it != objects_.end()) touch(id);
   return it == objects_.end() ? nullptr : it->second.get();
 }
 
@@ -30,6 +33,7 @@ const LibraryObject* ObjectLibrary::find(ObjectId id) const {
 }
 
 void ObjectLibrary::erase(ObjectId id) {
+  touch(id);
   unfile(id);
   objects_.erase(id);
 }
@@ -38,12 +42,23 @@ void ObjectLibrary::rename(ObjectId from, ObjectId to) {
   POCD_CHECK(find(to) == nullptr);
   const auto it = objects_.find(from);
   POCD_CHECK(it != objects_.end());
+  touch(from);
+  touch(to);
   unfile(from);
   std::unique_ptr<LibraryObject> object = std::move(it->second);
   objects_.erase(it);
   object->id = to;
   LibraryObject& moved = *objects_.emplace(to, std::move(object)).first->second;
   place(moved, moved.box);
+}
+
+std::set<ObjectId> ObjectLibrary::take_touched() {
+  std::set<ObjectId> ids = std::move(touched_);
+  touched_.clear();
+  if (!std::exchange(notes_touched_, true)) {
+    for (const auto& entry : objects_) ids.insert(entry.first);
+  }
+  return ids;
 }
 
 void ObjectLibrary::unfile(ObjectId id) {

@@ -20,6 +20,7 @@ struct BlockStore::Region {
   Region* newer = nullptr;
   std::unique_ptr<InMemory> memory;  // null: on disk
   PageRef page;                      // while on disk
+  bool stored = false;               // on disk, as it was before this process
 
   /// Number of a block within its region, x fastest.
   static std::uint32_t place(const BlockKey& block) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "block_finder.hpp"
 #include "block_store.hpp"
@@ -95,6 +96,50 @@ std::size_t TsdfMap::clear_object_where(
   return cleared;
 }
 
+std::size_t TsdfMap::clear_column(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                                  const std::function<bool(const Eigen::Vector2d&)>& inside) {
+  impl_->settle_touched();
+  const double voxel_m = impl_->config.voxel_size_m;
+  std::size_t cleared = 0;
+  for (const BlockKey& key : keys_by_region()) {
+    const Eigen::Vector2d corner = Eigen::Vector2d(key.x, key.y) * (8.0 * voxel_m);
+    if ((corner.array() > high.array()).any() ||
+        (corner.array() + 8.0 * voxel_m < low.array()).any()) {
+      continue;
+    }
+    impl_->store.begin_pass();
+    BlockStore::Region* region = impl_->store.region(key.region());
+    if (region == nullptr) continue;  // lost when it was to be read
+    impl_->store.enter(*region);
+    const std::uint32_t slot = impl_->store.find(key);
+    if (slot == BlockStore::kNoSlot) continue;
+    VoxelBlock& block = impl_->store.block(slot);
+    std::size_t here = 0;
+    bool surface = false;
+    for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
+      const Eigen::Vector2d center =
+          corner + Eigen::Vector2d((i & 7) + 0.5, (i >> 3 & 7) + 0.5) * voxel_m;
+      if (block.weight[i] > 0 && inside(center)) {
+        block.tsdf[i] = 0;
+        block.weight[i] = 0;
+        block.owner[i] = 0;
+        ++here;
+      }
+      surface |= block.weight[i] > 0 && block.tsdf[i] < kFreeTsdf;
+    }
+    if (here == 0) continue;
+    cleared += here;
+    impl_->store.mark_dirty(slot);
+    if (!surface) impl_->store.drop(slot);
+  }
+  return cleared;
+}
+
+void TsdfMap::clear() {
+  impl_->touched.clear();
+  impl_->store.clear();
+}
+
 std::size_t TsdfMap::reassign_object(ObjectId from, ObjectId to) {
   if (from == to) return 0;
   impl_->settle_touched();
@@ -158,6 +203,15 @@ std::vector<BlockKey> TsdfMap::keys_by_region() const {
 }
 
 std::vector<BlockKey> TsdfMap::take_dirty() { return impl_->store.take_dirty(); }
+
+void TsdfMap::keep_unsaved() { impl_->store.keep_unsaved(); }
+std::vector<BlockKey> TsdfMap::take_unsaved() { return impl_->store.take_unsaved(); }
+
+void TsdfMap::restore(const std::vector<StoredRegion>& regions,
+                      std::shared_ptr<RegionSource> source) {
+  POCD_CHECK(block_count() == 0);
+  impl_->store.restore(regions, std::move(source));
+}
 
 void TsdfMap::recall(const BlockKey& key) {
   impl_->store.begin_pass();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pocd/common/check.hpp"
 
@@ -30,8 +31,11 @@ void FreeSpace::forget_behind(const Eigen::Vector3f& eye_W, const Eigen::Vector3
     const Eigen::Vector3f p = surface_W + static_cast<float>(at) * along;
     const int x = floor_div(p.x(), cell_m_), y = floor_div(p.y(), cell_m_),
               z = floor_div(p.z(), cell_m_);
-    const auto it = blocks_.find({x >> 3, y >> 3, z >> 3});
-    if (it != blocks_.end()) (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] = 0;
+    const BlockKey key{x >> 3, y >> 3, z >> 3};
+    const auto it = blocks_.find(key);
+    if (it == blocks_.end()) continue;
+    (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] = 0;
+    if (notes_changes_) changed_.insert(key);
   }
 }
 
@@ -115,9 +119,38 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
           }
           if ((*block)[i] < 255) ++(*block)[i];
         }
+        if (block && notes_changes_) changed_.insert({bx, by, bz});
       }
     }
   }
+}
+
+void FreeSpace::forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside) {
+  for (auto entry = blocks_.begin(); entry != blocks_.end();) {
+    const BlockKey key = entry->first;
+    Block& block = *entry->second;
+    bool changed = false, left = false;
+    for (int i = 0; i < kCells; ++i) {
+      const Eigen::Vector2d center(kSide * key.x + (i & 7) + 0.5,
+                                   kSide * key.y + (i >> 3 & 7) + 0.5);
+      if (block[i] != 0 && inside(center * cell_m_)) {
+        block[i] = 0;
+        changed = true;
+      }
+      left |= block[i] != 0;
+    }
+    if (changed && notes_changes_) changed_.insert(key);
+    entry = changed && !left ? blocks_.erase(entry) : std::next(entry);
+  }
+}
+
+std::set<BlockKey> FreeSpace::take_changed() {
+  std::set<BlockKey> keys = std::move(changed_);
+  changed_.clear();
+  if (!std::exchange(notes_changes_, true)) {
+    for (const auto& entry : blocks_) keys.insert(entry.first);
+  }
+  return keys;
 }
 
 }  // namespace pocd

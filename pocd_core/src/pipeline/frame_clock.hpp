@@ -57,6 +57,7 @@ class FrameClock {
   StampNs newest_ns() const { return newest_ns_.value_or(0); }
 
  private:
+  friend struct ArchiveAccess;
   struct Heard {
     StampNs stamp_ns = 0;
     std::uint64_t frame = 0;  ///< number, over all robots

@@ -12,6 +12,8 @@ const char* to_string(EventKind kind) {
       return "MOVED";
     case EventKind::kRemoved:
       return "REMOVED";
+    case EventKind::kOperator:
+      return "OPERATOR";
   }
   return "";
 }

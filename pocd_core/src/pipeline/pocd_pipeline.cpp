@@ -2,13 +2,19 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <set>
 #include <string>
 
+#include "archive_access.hpp"
 #include "frame_clock.hpp"
+#include "ignored_regions.hpp"
+#include "looked_at.hpp"
 #include "../track/object_tracker.hpp"
+#include "operator_acts.hpp"
+#include "pipeline_archive.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {
@@ -58,7 +64,8 @@ struct PocdPipeline::Impl {
         pool(c.threads),
         pose_gate(c.pose_gate),
         tracker(c),
-        map(c.map) {}
+        map(c.map),
+        looked_at(c.map.voxel_size_m) {}
 
   PipelineConfig config;
   ClassTable classes;
@@ -69,6 +76,8 @@ struct PocdPipeline::Impl {
   ObjectTracker tracker;
   TsdfMap map;
   std::set<std::string> robots_with_masks;
+  IgnoredRegions ignored;
+  LookedAt looked_at;
   // Memory of a frame, kept between frames.
   OrganizedCloud cloud;
   PlaneSegmentation planes;
@@ -76,6 +85,15 @@ struct PocdPipeline::Impl {
   DepthField field;
   std::vector<std::uint32_t> owner_of_pixel;  ///< of observations
   bool mask_missing = false;
+  PipelineArchive archive;
+
+  PipelineParts parts() {
+    // All members: one that is added does not compile until it was decided whether it is kept.
+    [[maybe_unused]] auto& [config_, classes_, pool_, frame_clock_, pose_gate_, ground_, tracker_,
+                            map_, robots_with_masks_, ignored_regions_, looked_at_, cloud_, planes_, observations_, field_,
+                            owner_of_pixel_, mask_missing_, archive_] = *this;
+    return {frame_clock_, pose_gate_, ground_, robots_with_masks_, ignored_regions_, looked_at_, tracker_};
+  }
 
   /// Whether a robot that delivers masks did not this time.
   bool mask_is_missing(const Frame& frame) {
@@ -117,6 +135,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
 
   organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes,
            p.pool, p.cloud);
+  p.ignored.mark(p.config.map.max_depth_m, p.pool, p.cloud);
   clock.done("organize");
   Frame placed = frame;  // images are shared, not copied
   if (p.config.pose_refinement.enabled) {
@@ -142,6 +161,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
                          p.observations);
   }
   clock.done("cluster");
+  p.looked_at.note(p.cloud, frame.stamp_ns);
   p.field.update(p.cloud);
   p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_pixel,
                    result);
@@ -197,6 +217,33 @@ std::vector<ObjectSnapshot> PocdPipeline::objects() const {
 }
 
 std::uint64_t PocdPipeline::object_visits() const { return impl_->tracker.library().visits(); }
+
+std::vector<BlockKey> PocdPipeline::take_looked_at() { return impl_->looked_at.take(); }
+
+WordOutcome PocdPipeline::apply(const OperatorWord& word) {
+  Impl& p = *impl_;
+  return follow(word, {p.frame_clock.newest_ns(), p.tracker, p.map, p.ground, p.ignored});
+}
+
+std::vector<Piece> PocdPipeline::take_changed_pieces() {
+  return impl_->archive.take_changed(impl_->parts());
+}
+
+void PocdPipeline::restore(const std::vector<Piece>& pieces) {
+  impl_->archive.restore(impl_->parts(), pieces, impl_->config.map.voxel_size_m);
+}
+
+PocdPipeline::Numbers PocdPipeline::numbers() const {
+  return {ArchiveAccess::next_id(impl_->tracker), ArchiveAccess::next_event(impl_->tracker)};
+}
+
+void PocdPipeline::skip_to(const Numbers& numbers) {
+  std::uint32_t& object = ArchiveAccess::next_id(impl_->tracker);
+  std::uint64_t& event = ArchiveAccess::next_event(impl_->tracker);
+  object = std::max(object, numbers.object);
+  event = std::max(event, numbers.event);
+}
+
 TsdfMap& PocdPipeline::map() { return impl_->map; }
 const TsdfMap& PocdPipeline::map() const { return impl_->map; }
 

@@ -26,13 +26,24 @@ void Departures::forget(ObjectId id) {
       list_.end());
 }
 
+void Departures::forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside) {
+  list_.erase(
+      std::remove_if(list_.begin(), list_.end(),
+                     [&](const Departure& d) { return inside(d.box.pose.position_W.head<2>()); }),
+      list_.end());
+  moves_.erase(
+      std::remove_if(moves_.begin(), moves_.end(),
+                     [&](const Move& m) { return inside(m.from.pose.position_W.head<2>()); }),
+      moves_.end());
+}
+
 void Departures::set_asked_far(ObjectId id) {
   for (Departure& d : list_) d.asked_far |= d.id == id;
 }
 
 void Departures::set_clock_back(StampNs latest_ns) {
   for (Departure& d : list_) {
-    for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.departed_ns})
+    for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.first_gone_ns, &d.departed_ns})
       *stamp_ns = std::min(*stamp_ns, latest_ns);
   }
   for (Move& m : moves_) {

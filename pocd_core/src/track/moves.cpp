@@ -239,6 +239,8 @@ void ObjectTracker::depart(Step& step, Departure departure, const std::string& r
   event.robot = step.frame.robot;
   event.box = departure.box;
   event.evidence = departure.evidence;
+  event.last_there_ns = departure.in_place_ns;
+  event.first_gone_ns = departure.first_gone_ns;
   step.result.events.push_back(std::move(event));
   if (departure.part_of == ObjectId::kNone) step.result.retired.push_back(departure.id);
   departures_.add(std::move(departure));
@@ -346,6 +348,8 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   event.absorbed = absorbed;
   event.evidence = from.evidence;
   event.evidence.rule = rule;
+  event.last_there_ns = from.in_place_ns;
+  event.first_gone_ns = from.first_gone_ns;
   move.from = before;
   step.moves.push_back(move);
   departures_.add_move(move);

@@ -286,6 +286,7 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string&
   departure.surfels = object.model.surfels();
   departure.first_seen_ns = object.first_seen_ns;
   departure.in_place_ns = object.in_place_ns;
+  departure.first_gone_ns = object.looks_unobserved > 0 ? object.unobserved_since_ns : 0;
   departure.departed_ns = step.frame.stamp_ns;
   departure.arrival = object.arrival;
   departure.seen_by = object.seen_by;

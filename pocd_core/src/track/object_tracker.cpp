@@ -114,6 +114,7 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     for (Surfel& s : object->model.surfels()) bound(s.last_hit_ns);
     object->moment = {};
   }
+  library_.touch_all();
   departures_.set_clock_back(before_ns);
 }
 
@@ -196,7 +197,9 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   object.arrival = Arrival::kArrived;
   object.moved = true;
   object.placed_ns = step.frame.stamp_ns;
-  add_event(step, EventKind::kMoved, object, "aligned_elsewhere").previous_box = previous_box;
+  ObjectEvent& event = add_event(step, EventKind::kMoved, object, "aligned_elsewhere");
+  event.previous_box = previous_box;
+  event.last_there_ns = move.in_place_ns;
   object.reported_box = object.box;
   object.lost = 0;
   step.moves.push_back(move);

@@ -39,7 +39,24 @@ class ObjectTracker {
   /// known becomes known from just before it.
   void set_clock_back(StampNs now_ns);
 
+  // What an operator says, between two frames (operator_acts.cpp).
+
+  /// Who said what of which frame's state.
+  struct Said {
+    std::string by, rule;
+    StampNs stamp_ns = 0;
+  };
+  /// Nothing is known of the object any more. For one that was reported: the event.
+  void forget(ObjectId id, const Said& said, TsdfMap& map, FrameResult& result);
+  /// The object is gone, as if cameras had seen it go.
+  void confirm_removal(ObjectId id, const Said& said, TsdfMap& map, FrameResult& result);
+  /// The event of what was said.
+  void note(const Said& said, const OrientedBox& where, FrameResult& result);
+  /// What was found gone, and what was seen empty there.
+  void forget_places(const std::function<bool(const Eigen::Vector2d&)>& inside);
+
  private:
+  friend struct ArchiveAccess;
   struct Step;  ///< what the parts of one update share
 
   // In the order of update().

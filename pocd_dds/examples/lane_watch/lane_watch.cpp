@@ -1,5 +1,5 @@
-// What stands on a lane, what was seen to leave it, and when nobody knows: what was carried away
-// while the component was down stays unknown until a person has looked and starts this anew.
+// What stands on a lane, what was seen to leave it, and when nobody knows: after a restart of the
+// component all is unknown until a robot looks, and without a memory until a person has looked.
 #include <unistd.h>
 
 #include <cstdio>
@@ -20,11 +20,10 @@ int main(int argc, char** argv) {
   // By uuid. Unknown: seen on the lane before the component restarted, and not seen since.
   std::map<std::array<std::uint8_t, 16>, pocd::OrientedBox> on_lane, unknown;
   const auto tell = [&](const char* what, const pocd::WatchedObject& object) {
-    for (const auto& [uuid, box] : on_lane) {  // a new run has new uuids: seen again, by its place
+    for (const auto& [uuid, box] : on_lane) {  // without a memory uuids are new: by its place
       for (auto old = unknown.begin(); old != unknown.end();) {
-        const auto way = (old->second.pose.position_W - box.pose.position_W).head<2>();
-        const bool same = way.norm() < 0.5 * box.size_m.head<2>().minCoeff();
-        old = same ? unknown.erase(old) : std::next(old);
+        const auto way = (old->second.pose.position_W - box.pose.position_W).head<2>().norm();
+        old = way < 0.5 * box.size_m.head<2>().minCoeff() ? unknown.erase(old) : std::next(old);
       }
     }
     std::printf("%s %s %u: %zu on the lane, %zu unknown\n", what, object.class_name.c_str(),
@@ -33,15 +32,16 @@ int main(int argc, char** argv) {
   pocd::ObjectWatchOptions options;
   options.domain = std::atoi(argv[1]);
   options.on_object = [&](const pocd::WatchedObject& object) {  // new, or changed: may have moved
-    if (lane.has(object.state.box)) {
-      if (on_lane.insert_or_assign(object.uuid, object.state.box).second)
-        tell("blocked by", object);
-    } else if (on_lane.erase(object.uuid) > 0) {
-      tell("no longer blocked by", object);
+    auto& to = object.state.seen_in_run ? on_lane : unknown;
+    const auto was = (&to == &on_lane ? unknown : on_lane).erase(object.uuid);
+    if (!lane.has(object.state.box)) {
+      if (was + to.erase(object.uuid) > 0) tell("no longer blocked by", object);
+    } else if (to.insert_or_assign(object.uuid, object.state.box).second) {
+      tell(&to == &on_lane ? "blocked by" : "unknown since the component restarted:", object);
     }
   };
   options.on_gone = [&](const pocd::WatchedObject& object, pocd::Gone why) {
-    if (on_lane.erase(object.uuid) == 0) return;
+    if (on_lane.erase(object.uuid) + unknown.erase(object.uuid) == 0) return;
     if (why == pocd::Gone::kRemoved) return tell("no longer blocked by", object);
     unknown[object.uuid] = object.state.box;  // nobody has looked: not free
     tell("unknown since the component restarted:", object);

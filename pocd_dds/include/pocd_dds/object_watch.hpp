@@ -13,17 +13,23 @@
 namespace pocd {
 
 struct WatchedObject {
-  std::array<std::uint8_t, 16> uuid{};  ///< never used twice, by no node and no run
+  std::array<std::uint8_t, 16> uuid{};  ///< never used twice, by no node
   std::uint64_t epoch = 0;              ///< run of the node that says so
+  /// Memory that the node goes on with from run to run: its objects keep their uuids. Without a
+  /// memory, the epoch.
+  std::uint64_t lineage = 0;
   std::string class_name;
   ObjectSnapshot state;
 };
 
 enum class Gone {
   kRemoved,  ///< it was seen that it is not there any more, or it turned out to be another one
-  /// Its node was killed or has ended, and a new run, with names of its own, goes on. Nobody has
-  /// looked whether it is still there: its place is unknown and not free.
-  kReplaced
+  /// Its node was killed or has ended, and a new run that does not know it goes on: one without a
+  /// memory, or one whose memory had not kept it yet. Nobody has looked whether it is still there:
+  /// its place is unknown and not free.
+  kReplaced,
+  /// An operator had it forgotten. Its place is unknown and not free.
+  kForgotten
 };
 
 /// Callbacks may be empty. They are called one at a time, by a thread of the watch, in the order in

@@ -121,6 +121,7 @@ function changesShown() {
   const since = time.sinceStamp(), until = time.shown(), last = new Map();
   for (const event of panel.events.values()) {
     if (event.kind === "UPDATED" || event.stamp < since || event.stamp > until) continue;
+    if (event.kind === "OPERATOR") { last.delete(event.id); continue; }
     const first = last.get(event.id);
     if (event.kind === "REMOVED" && first?.kind === "ADDED") last.delete(event.id);
     else if (event.kind === "MOVED" && first?.kind === "ADDED") last.set(event.id, { ...event, kind: "ADDED" });

@@ -11,7 +11,7 @@ export class Panel {
     this.act = act;
     this.events = new Map();
     this.histories = new Map();
-    this.kinds = new Set(["ADDED", "MOVED", "REMOVED"]);
+    this.kinds = new Set(["ADDED", "MOVED", "REMOVED", "OPERATOR"]);
     this.selected = null;
     this.dirty = true;
     this.since = -Infinity;

@@ -138,5 +138,25 @@ TEST(MapReplica, NeverCallsAWrongMapRight) {
   EXPECT_GT(recovered, 500);
 }
 
+TEST(MapReplica, ANewRunThatGoesOnWithTheSameMapIsFollowedAsItIs) {
+  Random random(3);
+  const History h(random, 7, 6);
+  MapReplica replica;
+  for (int i = 0; i < 4; ++i) replica.apply(h.deltas[static_cast<std::size_t>(i)]);
+  // Of another version, or of another map: a snapshot is needed.
+  replica.note_published(8, 5, h.deltas[4].digest);
+  EXPECT_FALSE(replica.current());
+  replica.note_published(8, 4, h.deltas[4].digest);
+  EXPECT_FALSE(replica.current());
+  EXPECT_EQ(replica.epoch(), 7u);
+  replica.note_published(8, 4, h.deltas[3].digest);
+  EXPECT_EQ(replica.epoch(), 8u);
+  EXPECT_EQ(replica.stale_because(), "at version 4, the publisher is at 5") << "heard of before";
+  MapDelta next = h.deltas[4];
+  next.epoch = 8;
+  EXPECT_EQ(replica.apply(next), DeltaOutcome::kApplied);
+  EXPECT_TRUE(replica.current());
+}
+
 }  // namespace
 }  // namespace pocd::testing

@@ -7,6 +7,7 @@
 
 #include "pocd/config/describe.hpp"
 #include "pocd/input/input_config.hpp"
+#include "pocd/memory/memory_config.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 
 namespace pocd {
@@ -20,6 +21,7 @@ struct RosOutputConfig {
   double diagnostics_hz = 1.0;
   double occupancy_low_m = 0.1;
   double occupancy_high_m = 2.0;
+  int occupancy_not_looked_at = -1;
   int surface_points = 2'000'000;
   double obstacle_lifetime_s = 3.0;
   double rate_mb_s = 10.0;
@@ -39,6 +41,9 @@ struct RosOutputConfig {
           "Lower end of the heights where a surface makes a cell of the grid occupied [m].");
     visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
           "Upper end of these heights [m].");
+    visit("occupancy_not_looked_at", occupancy_not_looked_at, Range{-2, 100},
+          "Value of a cell that is known from the memory and not looked at since the node started; "
+          "-1: unknown, -2: as it was.");
     visit("surface_points", surface_points, Range{1000, 50'000'000},
           "Most points of rt/pocd/surface; a larger surface is thinned.");
     visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
@@ -65,6 +70,8 @@ struct NodeConfig : InputConfig {
   double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
   bool use_clock = false;
   RosOutputConfig outputs;
+  MemoryConfig memory;
+  bool commands = false;
   double shutdown_wait_s = 10.0;
   double health_window_s = 10.0;
   double stall_s = 10.0;
@@ -91,6 +98,9 @@ struct NodeConfig : InputConfig {
           "Take the time of the topics under outputs from rt/clock, for replays (ROS: "
           "use_sim_time).");
     visit.group("outputs", outputs, "Topics that ROS 2 tools and fleet managers take as they are.");
+    visit.group("memory", memory, "What is kept on disk from run to run.");
+    visit("commands", commands,
+          "Follow what operators say on pocd/command: whoever may write there changes the map.");
     visit("shutdown_wait_s", shutdown_wait_s, Range{0.0, 600.0},
           "How long to wait at the end for subscribers to acknowledge [s].");
     visit("health_window_s", health_window_s, Range{0.1, 3600.0},

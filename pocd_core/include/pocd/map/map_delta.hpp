@@ -101,6 +101,10 @@ class MapPublisher {
   std::optional<MapDelta> make_step(TsdfMap& map) const;
   void take_over(const MapDelta& step);
 
+  /// Goes on from what another run has published: for one that has published nothing. `tiles` are
+  /// those of `version`, which is at least 1. Throws InputError when their digest is another.
+  void restore(std::uint64_t version, const MapDigest& digest, std::vector<MapTile> tiles);
+
   std::uint64_t epoch() const { return epoch_; }
   std::uint64_t version() const { return version_; }
   MapDigest digest() const { return digest_; }

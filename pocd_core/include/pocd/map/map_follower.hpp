@@ -41,6 +41,8 @@ class MapFollower {
   /// What the publisher says it is at (manifest).
   void published(std::uint64_t epoch, std::uint64_t version, const MapDigest& digest);
   void delta(MapDelta delta);
+  /// Another run publishes under the epoch that is followed: what is held and known is of no use.
+  void forget();
   /// Whether a snapshot, of which tiles and keys do not matter here, would lead on.
   bool needs(const MapSnapshot& snapshot) const;
   /// False when it does not lead on, or does not fit its digest.

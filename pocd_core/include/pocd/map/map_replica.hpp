@@ -28,7 +28,8 @@ class MapReplica {
   /// ones come, in order, or a snapshot.
   DeltaOutcome apply(const MapDelta& delta);
 
-  /// What the publisher says it is at (manifest). Makes the copy stale when it is not.
+  /// What the publisher says it is at (manifest). Makes the copy stale when it is not. A new run
+  /// that goes on with just this map is followed as it is.
   void note_published(std::uint64_t epoch, std::uint64_t version, const MapDigest& digest);
 
   /// Takes a whole map, for example a snapshot or the transient-local tiles with a manifest.

@@ -100,6 +100,14 @@ class ObjectLibrary {
   /// Ids of objects whose box may lie within `radius_m` of `center_W` (horizontally), ascending.
   std::vector<ObjectId> near(const Eigen::Vector3d& center_W, double radius_m) const;
 
+  /// Ids of objects that may have changed, come or gone since the last call: all that were handed
+  /// out for change. For who writes them down; noted from the first call on.
+  std::set<ObjectId> take_touched();
+  /// All of them have been changed, through all().
+  void touch_all() {
+    for (const auto& entry : objects_) touch(entry.first);
+  }
+
   std::size_t size() const { return objects_.size(); }
   const std::map<ObjectId, std::unique_ptr<LibraryObject>>& all() const {
     visits_ += objects_.size();
@@ -110,6 +118,10 @@ class ObjectLibrary {
   std::uint64_t visits() const { return visits_; }
 
  private:
+  friend struct ArchiveAccess;
+  void touch(ObjectId id) {
+    if (notes_touched_) touched_.insert(id);
+  }
   using Cell = std::uint64_t;
   static Cell cell_at(std::int32_t x, std::int32_t y);
   static std::vector<Cell> cells_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
@@ -119,6 +131,8 @@ class ObjectLibrary {
   std::unordered_map<Cell, std::vector<ObjectId>> grid_;
   std::unordered_map<std::uint32_t, std::vector<Cell>> filed_;
   std::uint32_t next_id_ = 1;
+  bool notes_touched_ = false;
+  std::set<ObjectId> touched_;
   mutable std::uint64_t visits_ = 0;
 };
 

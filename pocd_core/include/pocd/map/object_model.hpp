@@ -52,6 +52,7 @@ class ObjectModel {
   void transform(const Pose& T_new_old);
 
  private:
+  friend struct ArchiveAccess;
   std::uint64_t cell_of(const Eigen::Vector3f& p) const;
   void rebuild_index();
   /// Lists a surfel that crept out of its cell in the one where it is now.

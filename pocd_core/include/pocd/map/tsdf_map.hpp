@@ -13,6 +13,7 @@
 #include "pocd/config/describe.hpp"
 #include "pocd/input/frame.hpp"
 #include "pocd/map/map_memory.hpp"
+#include "pocd/map/region_source.hpp"
 #include "pocd/map/voxel_block.hpp"
 
 namespace pocd {
@@ -93,6 +94,16 @@ class TsdfMap {
   std::size_t clear_object_where(ObjectId id,
                                  const std::function<bool(const Eigen::Vector3d&)>& inside);
 
+  /// Resets all voxels, of any owner, whose centre [m, W] lies in the column between `low` and
+  /// `high` [m, W] and is accepted by `inside`; drops blocks that end without a surface. Reads the
+  /// regions of the column back from disk. Returns how many voxels were reset.
+  std::size_t clear_column(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                           const std::function<bool(const Eigen::Vector2d&)>& inside);
+
+  /// Everything becomes unknown. Reads nothing from disk. Throws InputError, with nothing changed,
+  /// when map.memory.folder takes no new file.
+  void clear();
+
   /// Voxels of `from` become voxels of `to` (two library entries found to be one thing).
   std::size_t reassign_object(ObjectId from, ObjectId to);
 
@@ -113,6 +124,14 @@ class TsdfMap {
 
   /// Keys of blocks changed (or dropped) since the last call, canonical order; clears the list.
   std::vector<BlockKey> take_dirty();
+
+  /// From now on take_unsaved() gives the keys that take_dirty() has given since its own last call:
+  /// for who writes down what was published.
+  void keep_unsaved();
+  std::vector<BlockKey> take_unsaved();
+  /// Puts regions that were there before this process into an empty map: their voxels are read from
+  /// `source` when they are needed. Nothing of it is dirty.
+  void restore(const std::vector<StoredRegion>& regions, std::shared_ptr<RegionSource> source);
 
   /// Brings the region of a block back to memory, or finds that it is lost.
   void recall(const BlockKey& key);

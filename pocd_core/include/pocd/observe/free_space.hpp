@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <set>
 #include <unordered_map>
 
 #include "pocd/association/visibility.hpp"
@@ -35,16 +37,25 @@ class FreeSpace {
   /// to `depth_m`, is known no more.
   void forget_behind(const Eigen::Vector3f& eye_W, const Eigen::Vector3f& surface_W,
                      double depth_m);
+  /// Nothing is known any more of the cells whose centre [m, W] `inside` accepts.
+  void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
 
   std::size_t block_count() const { return blocks_.size(); }
 
+  /// Keys of the blocks that may have changed since the last call, for who writes them down; noted
+  /// from the first call on.
+  std::set<BlockKey> take_changed();
+
  private:
+  friend struct ArchiveAccess;
   static constexpr int kSide = 8;
   static constexpr int kCells = kSide * kSide * kSide;
   using Block = std::array<std::uint8_t, kCells>;
 
   double cell_m_;
   std::unordered_map<BlockKey, std::unique_ptr<Block>, BlockKeyHash> blocks_;  ///< looked up only
+  bool notes_changes_ = false;
+  std::set<BlockKey> changed_;
 };
 
 }  // namespace pocd

@@ -28,9 +28,14 @@ struct ObjectSnapshot {
   std::uint32_t observations = 0;
   std::string last_robot;            ///< namespace of the robot that saw it last
   std::vector<std::string> seen_by;  ///< all robots that have seen it, by name
+  /// Seen since the program started: false for what is known from a memory only. Set by publishers.
+  bool seen_in_run = true;
+  bool forgotten = false;  ///< by an operator's word: nobody has seen it go. Set by publishers.
 };
 
-enum class EventKind { kAdded, kUpdated, kMoved, kRemoved };
+/// kOperator: somebody said something of the map (operator_word.hpp; `rule` says what). With an
+/// object: nothing is known of it any more, and nobody has seen it go.
+enum class EventKind { kAdded, kUpdated, kMoved, kRemoved, kOperator };
 const char* to_string(EventKind kind);  ///< "ADDED", "UPDATED", "MOVED", "REMOVED"
 
 /// Why an event happened: enough to recompute the belief step that made it.
@@ -60,6 +65,10 @@ struct ObjectEvent {
   /// An object that was reported as ADDED before and turned out to be this one; its id is retired.
   std::optional<ObjectId> absorbed;
   Evidence evidence;
+  /// REMOVED, MOVED: it went between the last look that found it in its place and the first one of
+  /// those that found the place empty. 0: not known.
+  StampNs last_there_ns = 0, first_gone_ns = 0;
+  std::string by;  ///< who said so; empty: cameras saw it
 };
 
 /// A stage and the time it took, by the clock and of all its threads' processors; never used in a

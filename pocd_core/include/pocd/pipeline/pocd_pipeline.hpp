@@ -7,7 +7,9 @@
 #include "pocd/input/frame.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd/pipeline/frame_result.hpp"
+#include "pocd/pipeline/operator_word.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
+#include "pocd/pipeline/pipeline_pieces.hpp"
 
 namespace pocd {
 
@@ -31,6 +33,32 @@ class PocdPipeline {
   /// Objects and places that were looked at so far (ObjectLibrary::visits); TsdfMap::visits tells
   /// the same of the map.
   std::uint64_t object_visits() const;
+
+  /// Regions of the map in which a surface was measured since the last call, ascending. Without
+  /// those of before a restore().
+  std::vector<BlockKey> take_looked_at();
+
+  /// Does what an operator says, between two frames; its events have the stamp of the newest frame.
+  /// A word that cannot be followed changes nothing, and the outcome says why.
+  WordOutcome apply(const OperatorWord& word);
+
+  /// Everything beside the voxels that later frames depend on, as far as it is not what it was at
+  /// the last call or at restore(); at the first call, all there is. Between two frames.
+  std::vector<Piece> take_changed_pieces();
+  /// For a pipeline that has seen no frame: goes on where the one went on that gave these pieces,
+  /// all there were at one time. The voxels are TsdfMap::restore's. Throws InputError for pieces
+  /// that are none; the pipeline is of no use then.
+  void restore(const std::vector<Piece>& pieces);
+  /// What the next object and the next event will be called.
+  struct Numbers {
+    std::uint32_t object = 1;
+    std::uint64_t event = 1;
+  };
+  Numbers numbers() const;
+  /// Leaves numbers out that may have been used; none is given twice, so smaller ones change
+  /// nothing.
+  void skip_to(const Numbers& numbers);
+
   TsdfMap& map();
   const TsdfMap& map() const;
 

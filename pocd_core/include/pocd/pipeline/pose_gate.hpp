@@ -44,6 +44,7 @@ class PoseGate {
   std::optional<std::string> refuse(const Frame& frame);
 
  private:
+  friend struct ArchiveAccess;
   struct Track {
     Pose accepted = Pose::Identity();
     StampNs accepted_ns = 0;

@@ -56,6 +56,7 @@ class GroundModel {
   }
 
  private:
+  friend struct ArchiveAccess;
   bool known_ = false;
   bool from_class_ = false;
   Eigen::Vector3f normal_W_ = Eigen::Vector3f::UnitZ();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 
 #include "pocd/map/object_library.hpp"
 
@@ -16,7 +17,8 @@ struct Departure {
   std::vector<Surfel> surfels;
   StampNs first_seen_ns = 0;
   StampNs in_place_ns = 0;  ///< last seen in its place
-  StampNs departed_ns = 0;  ///< found gone
+  StampNs first_gone_ns = 0;  ///< first of the looks in a row that found it gone; 0: not known
+  StampNs departed_ns = 0;    ///< found gone
   Arrival arrival = Arrival::kUnknown;
   std::set<std::string> seen_by;
   Evidence evidence;
@@ -51,6 +53,8 @@ class Departures {
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
   bool has(ObjectId id) const;
   void forget(ObjectId id);
+  /// Those whose box has its middle [m, W] where `inside` accepts it.
+  void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
   void set_asked_far(ObjectId id);
   void add_move(const Move& move) { moves_.push_back(move); }
   /// As recent().
@@ -59,6 +63,7 @@ class Departures {
   void set_clock_back(StampNs latest_ns);
 
  private:
+  friend struct ArchiveAccess;
   std::deque<Departure> list_;
   std::deque<Move> moves_;
 };

@@ -1,0 +1,200 @@
+// Archives of classes with private members.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "archive_object.hpp"
+#include "../track/object_tracker.hpp"
+#include "frame_clock.hpp"
+#include "ignored_regions.hpp"
+#include "looked_at.hpp"
+#include "pocd/pipeline/pose_gate.hpp"
+#include "pocd/segmentation/planes.hpp"
+
+namespace pocd {
+
+/// Each description names all members: one that is added does not compile until it was decided
+/// what becomes of it.
+struct ArchiveAccess {
+  template <class Archive>
+  static void describe(Archive& a, FrameClock::Heard& heard) {
+    auto& [stamp_ns, frame, off_in_a_row] = heard;
+    a(stamp_ns, frame, off_in_a_row);
+  }
+  template <class Archive>
+  static void describe(Archive& a, FrameClock& clock) {
+    auto& [newest_ns, robots, frames] = clock;
+    a(newest_ns, frames);
+    by_robot(a, robots);
+  }
+  using Track = PoseGate::Track;
+  template <class Archive>
+  static void describe(Archive& a, Track& track) {
+    auto& [accepted, accepted_ns, velocity_mps, step_s, refused, refused_ns, in_a_row] = track;
+    a(accepted, accepted_ns, velocity_mps, step_s, refused, refused_ns, in_a_row);
+  }
+  template <class Archive>
+  static void describe(Archive& a, PoseGate& gate) {
+    [[maybe_unused]] auto& [config, tracks] = gate;
+    by_robot(a, tracks);
+  }
+  template <class Archive>
+  static void describe(Archive& a, GroundModel& ground) {
+    auto& [known, from_class, normal_W, offset_m, level_m, is_strip] = ground;
+    a(known, from_class, normal_W, offset_m, level_m, is_strip);
+  }
+  template <class Archive>
+  static void describe(Archive& a, IgnoredRegions& ignored) {
+    auto& [by_name] = ignored;
+    a(by_name);
+  }
+  template <class Archive>
+  static void describe(Archive& a, Departures& departures) {
+    auto& [list, moves] = departures;
+    a(list, moves);
+  }
+
+  /// First all first bytes of a field, then all second ones, and so on: they are alike and compress.
+  template <class Archive, class T>
+  static void by_planes(Archive& a, std::vector<Surfel>& surfels, T Surfel::*field) {
+    std::vector<std::uint8_t> plane(surfels.size());
+    for (std::size_t k = 0; k < sizeof(T); ++k) {
+      const auto byte = [&](std::size_t i) {
+        return reinterpret_cast<std::uint8_t*>(&(surfels[i].*field)) + k;
+      };
+      if constexpr (!Archive::kLoads) {
+        for (std::size_t i = 0; i < surfels.size(); ++i) plane[i] = *byte(i);
+      }
+      a.raw(plane.data(), plane.size());
+      if constexpr (Archive::kLoads) {
+        for (std::size_t i = 0; i < surfels.size(); ++i) *byte(i) = plane[i];
+      }
+    }
+  }
+  template <class Archive>
+  static void by_planes(Archive& a, std::vector<Surfel>& surfels) {
+    surfels.resize(a.count(surfels.size()));
+    if (surfels.empty()) return;
+    // All members, as below.
+    [[maybe_unused]] auto& [point, normal, weight, hits, through, is_new, hit_ns] = surfels.front();
+    by_planes(a, surfels, &Surfel::point_W);
+    by_planes(a, surfels, &Surfel::normal_W);
+    by_planes(a, surfels, &Surfel::weight);
+    by_planes(a, surfels, &Surfel::hits);
+    by_planes(a, surfels, &Surfel::seen_through);
+    std::vector<std::uint8_t> arrived;
+    for (const Surfel& surfel : surfels) arrived.push_back(surfel.arrived ? 1 : 0);
+    a.raw(arrived.data(), arrived.size());
+    if constexpr (Archive::kLoads) {
+      for (std::size_t i = 0; i < surfels.size(); ++i) surfels[i].arrived = arrived[i] == 1;
+    }
+    by_planes(a, surfels, &Surfel::last_hit_ns);
+  }
+
+  /// The index lists each surfel in its own cell, or in one that it crept out of.
+  template <class Archive>
+  static void describe(Archive& a, ObjectModel& m) {
+    [[maybe_unused]] auto& [spacing_m, inverse_spacing, surfels, index] = m;
+    by_planes(a, surfels);
+    std::vector<std::pair<std::int32_t, std::uint64_t>> elsewhere;  // surfel, cell
+    if constexpr (!Archive::kLoads) {
+      bool any = false;
+      for (std::size_t i = 0; i < m.surfels_.size() && !any; ++i) any = !at_home(m, i);
+      if (any) {
+        for (const auto& [cell, i] : m.index_) {
+          if (!at_home(m, static_cast<std::size_t>(i))) elsewhere.emplace_back(i, cell);
+        }
+        std::sort(elsewhere.begin(), elsewhere.end());
+      }
+    }
+    a(elsewhere);
+    if constexpr (Archive::kLoads) {
+      m.index_.clear();
+      m.index_.reserve(m.surfels_.size());
+      auto next = elsewhere.begin();
+      for (std::size_t i = 0; i < m.surfels_.size(); ++i) {
+        const auto number = static_cast<std::int32_t>(i);
+        std::uint64_t cell = 0;
+        if (next != elsewhere.end() && next->first == number) {
+          cell = next++->second;
+        } else {
+          cell = m.cell_of(m.surfels_[i].point_W);
+        }
+        if (!m.index_.try_emplace(cell, number).second) a.fail("two surfels are in one cell");
+      }
+      if (next != elsewhere.end()) a.fail("a cell names no surfel");
+    }
+  }
+  static bool at_home(const ObjectModel& m, std::size_t i) {
+    const auto at = m.index_.find(m.cell_of(m.surfels_[i].point_W));
+    return at != m.index_.end() && at->second == static_cast<std::int32_t>(i);
+  }
+
+  using FreeBlock = FreeSpace::Block;
+  /// Null where nothing was seen.
+  static const FreeBlock* free_block(const FreeSpace& space, const BlockKey& key) {
+    const auto at = space.blocks_.find(key);
+    return at == space.blocks_.end() ? nullptr : at->second.get();
+  }
+  static FreeBlock& make_free_block(FreeSpace& space, const BlockKey& key) {
+    std::unique_ptr<FreeBlock>& block = space.blocks_[key];
+    block = std::make_unique<FreeBlock>();
+    return *block;
+  }
+
+  static StampNs& looked_ns(LookedAt& looked, const BlockKey& region) {
+    [[maybe_unused]] auto& [inverse_m, last_ns, fresh, changed, notes_changes] = looked;
+    return last_ns[region];
+  }
+
+  /// But for objects and free space, which are pieces of their own.
+  template <class Archive>
+  static void describe(Archive& a, ObjectTracker& tracker) {
+    // Looks are of one frame, and what changed is listed with each result.
+    [[maybe_unused]] auto& [config, library, free_space, departures, arrivals, next_event, looks,
+                            changed] = tracker;
+    [[maybe_unused]] auto& [objects, grid, filed, next_id, notes, touched, visits] = library;
+    [[maybe_unused]] auto& [cell_m, blocks, notes_changes, changed_blocks] = free_space;
+    a(next_id, next_event, departures, arrivals);
+  }
+  static ObjectLibrary& library(ObjectTracker& t) { return t.library_; }
+  static FreeSpace& free_space(ObjectTracker& t) { return t.free_space_; }
+  static std::uint32_t& next_id(ObjectTracker& t) { return t.library_.next_id_; }
+  static std::uint64_t& next_event(ObjectTracker& t) { return t.next_event_; }
+
+  /// Of private structs, which argument-dependent look-up does not find.
+  template <class Archive, class T>
+  static void by_robot(Archive& a, std::map<std::string, T>& list) {
+    const std::uint32_t n = a.count(list.size());
+    if constexpr (Archive::kLoads) {
+      list.clear();
+      for (std::uint32_t i = 0; i < n; ++i) {
+        std::string robot;
+        a(robot);
+        describe(a, list[robot]);
+      }
+    } else {
+      for (auto& [robot, value] : list) {
+        a(robot);
+        describe(a, value);
+      }
+    }
+  }
+
+  /// Puts an object into a library that has none of this id.
+  static void insert(ObjectLibrary& library, std::unique_ptr<LibraryObject> object) {
+    LibraryObject& placed = *object;
+    library.objects_[object->id] = std::move(object);
+    library.place(placed, OrientedBox(placed.box));
+  }
+};
+
+/// Found by argument-dependent look-up for the classes above.
+template <class Archive, class T>
+auto archive(Archive& a, T& v) -> decltype(ArchiveAccess::describe(a, v)) {
+  ArchiveAccess::describe(a, v);
+}
+
+}  // namespace pocd

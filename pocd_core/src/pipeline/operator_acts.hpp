@@ -1,0 +1,20 @@
+// What an operator's word does to the parts of a pipeline.
+#pragma once
+
+#include "../track/object_tracker.hpp"
+#include "ignored_regions.hpp"
+#include "pocd/pipeline/operator_word.hpp"
+
+namespace pocd {
+
+struct WordParts {
+  StampNs stamp_ns;  ///< of the newest frame
+  ObjectTracker& tracker;
+  TsdfMap& map;
+  GroundModel& ground;
+  IgnoredRegions& ignored;
+};
+
+WordOutcome follow(const OperatorWord& word, const WordParts& parts);
+
+}  // namespace pocd
