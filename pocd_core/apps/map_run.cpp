@@ -13,6 +13,7 @@
 #include "pocd/map/birdseye.hpp"
 #include "pocd/map/map_delta.hpp"
 #include "pocd/map/mesh.hpp"
+#include "pocd/network/segmentation_network.hpp"
 #include "pocd/output/result_csv.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
@@ -94,7 +95,12 @@ void note(const MapProgress& progress, const DatasetReader& reader, RunSummary& 
 
 void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory& memory,
                  RunSummary& summary, std::ostream& log) {
-  const std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
+  std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
+  if (!options.network.empty()) {
+    reader = segmented(std::move(reader),
+                       std::make_shared<SegmentationNetwork>(
+                           options.network, options.config.classes, options.config.threads));
+  }
   EventsCsv events(options.output / "events.csv");
   TimingCsv timing(options.output / "timing.csv");
   Progress progress(options.show_progress, reader->size());

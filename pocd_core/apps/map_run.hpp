@@ -16,6 +16,8 @@ namespace pocd {
 struct MapRunOptions {
   DatasetOptions dataset;
   PipelineConfig config;
+  /// ONNX model that makes the masks; empty: those of the data set.
+  std::filesystem::path network;
   std::filesystem::path output;
   MapMemoryOptions memory;
   std::optional<std::uint64_t> max_frames;

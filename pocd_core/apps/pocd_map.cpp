@@ -58,6 +58,9 @@ int main(int argc, char** argv) {
   app.add_option_function<std::string>(
       "--threads", [&](const std::string& n) { overrides.push_back("threads=" + n); },
       "Threads; results do not depend on it");
+  app.add_option("--network", options.network,
+                 "ONNX model, with its description beside it (docs/segmentation.md), that makes the "
+                 "masks from the colour images; masks of the inputs are not used");
   app.add_option("--output", options.output, "Folder for the results, made if missing")->required();
   app.add_option("--max-frames", options.max_frames, "Stop after that many good frames")
       ->check(CLI::Range(1, 1000000000));
@@ -86,6 +89,7 @@ int main(int argc, char** argv) {
     file.node.set_robots(robots);
     options.config = file.pipeline;
     options.dataset.input = file.node;
+    if (!options.network.empty()) options.dataset.input.use_color_alone();
   } catch (const pocd::InputError& error) {
     std::cerr << "pocd_map: " << error.what() << '\n';
     return 2;

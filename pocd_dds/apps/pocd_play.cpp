@@ -5,6 +5,7 @@
 #include "pocd/config/config_io.hpp"
 #include "pocd/config/dataset_options_cli.hpp"
 #include "pocd/config/node_config.hpp"
+#include "pocd/network/segmentation_network.hpp"
 #include "pocd_dds/play/player.hpp"
 #include "pocd_dds/recording/replayer.hpp"
 
@@ -96,12 +97,15 @@ int main(int argc, char** argv) {
       "Exit code: 0 everything sent and acknowledged, 1 not, 2 usage.",
       "pocd_play");
   pocd::dds::PlayOptions options;
+  pocd::DatasetOptions dataset;
+  std::filesystem::path network;
+  std::vector<std::filesystem::path> files;
   options.bus.name = "pocd_play";
   double speed = 1.0;
   bool fast = false, no_wait = false;
   app.set_version_flag("--version", POCD_VERSION);
   std::vector<std::string> input_settings;
-  pocd::add_dataset_options(app, options.dataset);
+  pocd::add_dataset_options(app, dataset);
   pocd::add_topic_options(app, input_settings);
   app.get_option("--dataset")->required(false);
   app.get_option("--input")->required(false);
@@ -122,7 +126,16 @@ int main(int argc, char** argv) {
                "too, or it only hears what it has time for)");
   app.add_flag("--clock", options.clock, "Publish rt/clock");
   app.add_flag("--no-wait", no_wait, "Do not wait for readers");
-  app.add_flag("!--no-color", options.dataset.with_color, "No colour images");
+  app.add_flag("!--no-color", dataset.with_color, "No colour images");
+  CLI::Option* config = app.add_option("--config", files,
+                                       "Configuration file whose classes.list has the ids of the "
+                                       "network's classes; repeat it to overlay several")
+                            ->allow_extra_args(false);
+  app.add_option(
+         "--network", network,
+         "ONNX model, with its description beside it (docs/segmentation.md), that makes the "
+         "masks from the colour images")
+      ->needs(config);
   app.add_option("--max-frames", options.max_frames, "Stop after that many good frames")
       ->check(CLI::Range(1, 1000000000));
   app.add_option("--map-frame", options.map_frame, "Frame that the poses are in")
@@ -138,11 +151,13 @@ int main(int argc, char** argv) {
     if (!has_dataset) check_recording_flags(app);
     set_remap(remap, replay);
     // For recordings, --rate is the multiple of the original speed that it is with rosbag2.
-    if (!has_dataset && app.count("--rate") > 0) speed = options.dataset.frame_rate_hz;
+    if (!has_dataset && app.count("--rate") > 0) speed = dataset.frame_rate_hz;
     pocd::NodeFile file;
-    pocd::load_config(file, {}, input_settings);
-    options.dataset.input = file.node;
-    if (options.dataset.with_color) options.dataset.input.color = "optional";
+    pocd::load_config(file, files, input_settings);
+    dataset.input = file.node;
+    dataset.classes = file.pipeline.classes;
+    if (dataset.with_color) dataset.input.color = "optional";
+    if (!network.empty()) dataset.input.use_color_alone();
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
@@ -168,7 +183,12 @@ int main(int argc, char** argv) {
       replay.keyboard = true;
       return replay_recordings(replay);
     }
-    pocd::dds::Player player(options);
+    std::unique_ptr<pocd::DatasetReader> reader = pocd::open_dataset(dataset);
+    if (!network.empty()) {
+      reader = pocd::segmented(std::move(reader), std::make_shared<pocd::SegmentationNetwork>(
+                                                      network, dataset.classes, 1));
+    }
+    pocd::dds::Player player(options, std::move(reader));
     const pocd::dds::PlayResult result = player.run(pocd::dds::stop_requested);
     std::cout << result.frames << " frames sent, " << result.skipped << " skipped"
               << (result.stopped ? ", stopped early" : "") << '\n';

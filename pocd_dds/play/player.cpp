@@ -149,10 +149,10 @@ class Player::Robot {
   Writer<tf2_msgs::msg::TFMessagePubSubType> tf_static_;
 };
 
-Player::Player(const PlayOptions& options)
+Player::Player(const PlayOptions& options, std::unique_ptr<DatasetReader> reader)
     : options_(options),
       participant_(std::make_shared<Participant>(options.bus)),
-      reader_(open_dataset(options.dataset)) {
+      reader_(std::move(reader)) {
   if (options.clock) {
     clock_ =
         std::make_unique<Writer<rosgraph_msgs::msg::ClockPubSubType>>(participant_, topics::kClock);

@@ -18,7 +18,6 @@ namespace pocd::dds {
 
 struct PlayOptions {
   BusOptions bus;
-  DatasetOptions dataset;
   TopicPatterns topics;
   std::string robot = "robot1";  ///< name of the robot of sources that name none
   std::string map_frame = "map";
@@ -40,8 +39,8 @@ struct PlayResult {
 
 class Player {
  public:
-  /// Throws InputError when the source or the bus cannot be used.
-  explicit Player(const PlayOptions& options);
+  /// Plays what `reader` gives. Throws InputError when the bus cannot be used.
+  Player(const PlayOptions& options, std::unique_ptr<DatasetReader> reader);
   ~Player();
 
   /// Waits for readers, sends all frames, waits until they are acknowledged. Ends early when `stop`

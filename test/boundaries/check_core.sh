@@ -22,7 +22,7 @@ done < <(find "$source_folder/pocd_core" "$prefix/include/pocd" -type f \
   \( -name '*.hpp' -o -name '*.cpp' -o -name '*.h' \) -print0)
 ((checked > 20)) || complain "only $checked files found: wrong folders?"
 
-for library in "$prefix"/lib/libpocd_core.* "$prefix"/lib/libpocd_config.*; do
+for library in "$prefix"/lib/libpocd_core.* "$prefix"/lib/libpocd_config.* "$prefix"/lib/libpocd_network.*; do
   [[ -f $library ]] || { complain "$library is not installed" && continue; }
   if nm --demangle "$library" 2>/dev/null | grep -E 'eprosima|fastdds|fastcdr' >&2; then
     complain "$library uses middleware symbols"
@@ -33,6 +33,13 @@ for program in pocd_map pocd_parameters; do
   [[ -x $prefix/bin/$program ]] || continue
   if ldd "$prefix/bin/$program" | grep -E 'fastrtps|fastcdr|ddsc' >&2; then
     complain "$program is linked with middleware"
+  fi
+done
+# Only what runs a network loads OpenCV's dnn module.
+for program in pocd_node pocd_mirror pocd_health pocd_view pocd_record; do
+  [[ -x $prefix/bin/$program ]] || continue
+  if ldd "$prefix/bin/$program" | grep 'opencv_dnn' >&2; then
+    complain "$program is linked with OpenCV's dnn module"
   fi
 done
 exit $failed

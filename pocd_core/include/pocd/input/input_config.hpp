@@ -154,6 +154,12 @@ struct InputConfig {
   /// changes. Throws InputError.
   void set_robots(const std::vector<std::string>& names);
 
+  /// Masks come from a network that sees the colour images: those of the robots are not looked at.
+  void use_color_alone() {
+    segmentation = "absent";
+    color = "required";
+  }
+
   /// Robots are found by their topics.
   bool discovers() const { return robots.empty() || discover_robots; }
 };
