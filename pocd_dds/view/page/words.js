@@ -27,6 +27,7 @@ const rules = {
   nothing_left: "nearly all of its surface was seen to be gone",
   place_taken: "something else stands in its place",
   found_again: "an object that had gone was found again here",
+  moved_alike: "it went the way that a thing beside it went",
   aligned_elsewhere: "its surface fits at another place",
   part_removed: "a part of it is gone",
   grew: "more of it was seen",

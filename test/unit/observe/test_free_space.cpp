@@ -49,6 +49,20 @@ TEST_F(FreeSpaceTest, ACellCountsAfterSomeLooksOnly) {
   EXPECT_GT(free_.block_count(), 0u);
 }
 
+TEST_F(FreeSpaceTest, BehindWhatArrivedNothingIsKnown) {
+  look(room_with({}), 5);
+  const Eigen::Vector3f eye_W = eye_.translation().cast<float>();
+  const Eigen::Vector3f along = (kPlace - eye_W).normalized();
+  const Eigen::Vector3f surface_W = eye_W + 1.5f * along;
+  const auto at = [&](float beyond_m) { return Eigen::Vector3f(surface_W + beyond_m * along); };
+  free_.forget_behind(eye_W, surface_W, 0.5);
+  EXPECT_TRUE(free_.seen_empty(at(-0.3f))) << "before it";
+  for (const float beyond_m : {0.0f, 0.2f, 0.5f}) EXPECT_FALSE(free_.seen_empty(at(beyond_m)));
+  EXPECT_TRUE(free_.seen_empty(at(0.7f))) << "farther than it can be deep";
+  look(room_with({}), FreeSpace::kLooks);
+  EXPECT_TRUE(free_.seen_empty(at(0.2f))) << "seen empty again";
+}
+
 TEST_F(FreeSpaceTest, WhatIsNotInViewIsNotSeenEmpty) {
   look(room_with({}), 5);
   EXPECT_FALSE(free_.seen_empty({0.0f, 3.9f, 0.8f})) << "behind the wall";

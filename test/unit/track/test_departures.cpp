@@ -43,6 +43,43 @@ TEST(Departures, ForgetTakesOutOneId) {
   EXPECT_EQ(ids(departures.recent(100 * kSecond, 60.0)), (std::vector<std::uint32_t>{1, 3}));
 }
 
+TEST(Departures, HasWhatWasNotForgotten) {
+  Departures departures;
+  departures.add(departed(1, 100 * kSecond));
+  EXPECT_TRUE(departures.has(ObjectId{1}));
+  EXPECT_FALSE(departures.has(ObjectId{2}));
+  departures.forget(ObjectId{1});
+  EXPECT_FALSE(departures.has(ObjectId{1}));
+}
+
+TEST(Departures, MovesAreKeptForTheWindowToo) {
+  Departures departures;
+  Move move;
+  for (const std::uint32_t id : {1u, 2u}) {
+    move.id = ObjectId{id};
+    move.moved_ns = id * 100 * kSecond;
+    move.in_place_ns = move.moved_ns - kSecond;
+    departures.add_move(move);
+  }
+  EXPECT_EQ(departures.recent_moves(160 * kSecond, 60.0).size(), 2u);
+  ASSERT_EQ(departures.recent_moves(161 * kSecond, 60.0).size(), 1u);
+  EXPECT_EQ(departures.recent_moves(161 * kSecond, 60.0).front().id, ObjectId{2});
+  departures.set_clock_back(50 * kSecond);
+  EXPECT_EQ(departures.recent_moves(110 * kSecond, 60.0).size(), 1u);
+  EXPECT_TRUE(departures.recent_moves(111 * kSecond, 60.0).empty()) << "by the new clock";
+}
+
+TEST(Motion, OfThoseThatExplainTheSameTheShortestIsLikeliest) {
+  Motion near, far, partly;
+  near.fit = far.fit = partly.fit = 1.0;
+  near.seen = far.seen = 0.9;
+  near.lengths = partly.lengths = 0.5;
+  far.lengths = 1.5;
+  partly.seen = 0.2;
+  EXPECT_GT(near.likelihood(), far.likelihood());
+  EXPECT_GT(far.likelihood(), partly.likelihood()) << "seen as a whole, though farther";
+}
+
 TEST(Departures, AClockThatIsSetBackMakesThemJustDeparted) {
   Departures departures;
   departures.add(departed(1, 3500 * kSecond));
