@@ -14,7 +14,7 @@ class DamagedMemory : public ::testing::Test {
  protected:
   void SetUp() override {
     MemoryRunner run(circuit_config(), folder_ / "memory");
-    for (int i = 0; i < 90; ++i) run.process(small_frames());
+    for (int i = 0; i < 60; ++i) run.process(circuit_frames());
     ASSERT_GE(run.pipeline().objects().size(), 2u);
     ASSERT_TRUE(run.finish());
     run.outcome(folder_ / "map");
