@@ -12,13 +12,16 @@
 namespace {
 
 int check_states(const std::filesystem::path& folder, const std::filesystem::path& truth_file,
-                 const pocd::PipelineConfig& config) {
+                 const pocd::PipelineConfig& config, bool with_masks) {
   pocd::StateTruth truth;
   pocd::load_config(truth, {truth_file});
   const pocd::StateRun run =
-      pocd::run_states(truth, folder, config, [](const pocd::StateRun& so_far) {
-        std::cout << pocd::describe_last_state(so_far) << std::flush;
-      });
+      pocd::run_states(
+          truth, folder, config,
+          [](const pocd::StateRun& so_far) {
+            std::cout << pocd::describe_last_state(so_far) << std::flush;
+          },
+          with_masks);
   std::size_t listed = 0, box = 0;
   for (const pocd::StateVerdict& verdict : run.verdicts) {
     listed += verdict.ok_listed;
@@ -72,9 +75,12 @@ int main(int argc, char** argv) {
   std::vector<std::string> overrides;
   std::vector<double> gravity;
   std::size_t max_frames = 0;
+  bool with_masks = true;
   app.set_version_flag("--version", POCD_VERSION);
   auto* states_option =
       app.add_option("--states", states, "Folder of labelled PCD files, one per state");
+  app.add_flag("!--no-masks", with_masks, "Leave the labels out: what is a thing is told by geometry")
+      ->needs(states_option);
   app.add_option("--truth", truth, "Truth of the states (YAML)")->needs(states_option);
   auto* still_option = app.add_option("--still", still, "Folder of frames in the rgbd layout");
   still_option->excludes(states_option);
@@ -102,7 +108,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    if (!states.empty()) return check_states(states, truth, config);
+    if (!states.empty()) return check_states(states, truth, config, with_masks);
     pocd::DatasetOptions options;
     options.format = "rgbd";
     options.inputs = {still};

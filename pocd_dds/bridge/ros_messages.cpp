@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::int32_t kCube = 1, kAdd = 0, kDelete = 2,
                        kDeleteAll = 3;                          // visualization_msgs/Marker
-constexpr std::int32_t kObstacleAdd = 1, kObstacleDelete = 2;   // rmf_obstacle_msgs/Obstacle
+constexpr std::int32_t kObstacleAdd = 1;                        // rmf_obstacle_msgs/Obstacle
 constexpr std::uint8_t kUint16 = 4, kUint32 = 6, kFloat32 = 7;  // sensor_msgs/PointField
 
 geometry_msgs::msg::Pose pose_of(const OrientedBox& box) {
@@ -80,32 +80,25 @@ visualization_msgs::msg::MarkerArray marker_array(const ObjectsById& objects,
 }
 
 rmf_obstacle_msgs::msg::Obstacles obstacles_message(const ObjectsById& objects,
-                                                    const std::vector<ObjectId>& gone,
                                                     const ClassMap& classes,
                                                     const ObstacleOptions& options, StampNs now_ns,
                                                     const std::string& frame_id) {
   rmf_obstacle_msgs::msg::Obstacles message;
   message.header(header_of(now_ns, frame_id));
   const auto whole_s = static_cast<std::int32_t>(options.lifetime_s);
-  const auto push = [&](ObjectId id, std::int32_t action) -> rmf_obstacle_msgs::msg::Obstacle& {
+  for (const auto& [id, object] : objects) {
     rmf_obstacle_msgs::msg::Obstacle& obstacle = message.obstacles().emplace_back();
     obstacle.header(message.header());
     obstacle.id(number_of(id));
     obstacle.source(options.source);
     obstacle.level_name(options.level_name);
-    obstacle.bbox().center().orientation().w(1.0);
-    obstacle.lifetime().sec(whole_s);
-    obstacle.lifetime().nanosec(
-        static_cast<std::uint32_t>(std::llround((options.lifetime_s - whole_s) * 1e9)));
-    obstacle.action(action);
-    return obstacle;
-  };
-  for (const ObjectId id : gone) push(id, kObstacleDelete);
-  for (const auto& [id, object] : objects) {
-    rmf_obstacle_msgs::msg::Obstacle& obstacle = push(id, kObstacleAdd);
     obstacle.classification(classes.name(object.class_id));
     obstacle.bbox().center(pose_of(object.box));
     obstacle.bbox().size(vector_of(object.box.size_m));
+    obstacle.lifetime().sec(whole_s);
+    obstacle.lifetime().nanosec(
+        static_cast<std::uint32_t>(std::llround((options.lifetime_s - whole_s) * 1e9)));
+    obstacle.action(kObstacleAdd);
   }
   return message;
 }
@@ -118,8 +111,10 @@ nav_msgs::msg::OccupancyGrid grid_message(const CellRectangle& grid, double reso
   message.info().resolution(static_cast<float>(resolution_m));
   message.info().width(grid.width);
   message.info().height(grid.height);
-  message.info().origin().position().x(grid.x * resolution_m);
-  message.info().origin().position().y(grid.y * resolution_m);
+  // A multiple of the resolution as it is sent: Nav2 asks for it.
+  const double sent_m = message.info().resolution();
+  message.info().origin().position().x(grid.x * sent_m);
+  message.info().origin().position().y(grid.y * sent_m);
   message.info().origin().orientation().w(1.0);
   message.data().assign(grid.cells.begin(), grid.cells.end());
   return message;

@@ -41,14 +41,14 @@ visualization_msgs::msg::MarkerArray marker_array(const ObjectsById& objects,
                                                   StampNs stamp_ns, const std::string& frame_id);
 
 /// Open-RMF expires an obstacle when its own stamp plus its lifetime lies behind the receiver's
-/// clock: the stamp is that of sending, not that of the frame.
+/// clock: the stamp is that of sending, not that of the frame. What is gone is no longer sent and
+/// lapses: a receiver that does not read the action of a deletion would take it for an obstacle.
 struct ObstacleOptions {
   std::string source;  ///< with the id, names an obstacle among those of all publishers
   std::string level_name;
   double lifetime_s = 3.0;
 };
 rmf_obstacle_msgs::msg::Obstacles obstacles_message(const ObjectsById& objects,
-                                                    const std::vector<ObjectId>& gone,
                                                     const ClassMap& classes,
                                                     const ObstacleOptions& options, StampNs now_ns,
                                                     const std::string& frame_id);

@@ -173,8 +173,8 @@ void RosOutputs::send_markers() {
 
 void RosOutputs::send_obstacles() {
   auto message =
-      obstacles_message(objects_, obstacle_departures_.update(objects_), config_.pipeline.classes,
-                        obstacle_options_, now_ns_, config_.node.map_frame);
+      obstacles_message(objects_, config_.pipeline.classes, obstacle_options_, now_ns_,
+                        config_.node.map_frame);
   if (!message.obstacles().empty()) obstacles_->write(message);
 }
 
@@ -198,8 +198,11 @@ void RosOutputs::send_occupancy() {
   const int readers = grid_->ever_matched() + grid_updates_->ever_matched();
   const auto& rectangle = projection_.changed_rectangle();
   if (rectangle) grid_outdated_ = true;
+  // Nav2 may lose an update that comes between a whole grid and its next cycle.
+  const bool due = now_ns_ - grid_whole_ns_ >= static_cast<StampNs>(1e9 * rates_.occupancy_whole_s);
   // One that is refused is made good by a whole one at the next period.
-  if (resized || grid_unsent_ || (grid_outdated_ && (readers != grid_readers_ || last_))) {
+  if (resized || grid_unsent_ || (grid_outdated_ && (readers != grid_readers_ || due || last_))) {
+    grid_whole_ns_ = now_ns_;
     auto message = grid_message(projection_.grid(), config_.pipeline.map.voxel_size_m, stamp_ns_,
                                 config_.node.map_frame);
     spend(*grid_, message.data().size());

@@ -91,9 +91,10 @@ class RosOutputs {
   std::set<TileKey> old_tiles_;  // of the grid's steps: not looked at since the start
 
   bool all_markers_anew_ = true;
-  Departures marker_departures_, obstacle_departures_;
+  Departures marker_departures_;
   OccupancyProjection projection_;
   std::atomic<bool> grid_too_large_{false};
+  StampNs grid_whole_ns_ = 0;   // when the last whole grid was sent
   int grid_readers_ = 0;        // ever matched when the last whole grid was sent
   bool grid_outdated_ = false;  // updates have been sent since the last whole one
   bool grid_unsent_ = false;    // the last message was refused

@@ -254,7 +254,7 @@ TEST(Departures, AreSaidSeveralTimesAndOnlyOfThoseWhoWereThere) {
   EXPECT_TRUE(departures.update({{ObjectId{2}, any}}).empty()) << "it is back";
 }
 
-TEST(ObstaclesMessage, AddsAndDeletesWithLifetimeAndSource) {
+TEST(ObstaclesMessage, AddsWithLifetimeAndSource) {
   ObjectSnapshot object;
   object.id = ObjectId{4};
   object.class_id = 9;
@@ -262,14 +262,11 @@ TEST(ObstaclesMessage, AddsAndDeletesWithLifetimeAndSource) {
   object.box.pose.yaw_rad = 0.5;
   object.box.size_m = {4, 5, 6};
   ClassMap classes;
-  const auto message = obstacles_message({{object.id, object}}, {ObjectId{2}}, classes,
-                                         {"here", "L2", 2.25}, 7'000'000'001, "map");
-  ASSERT_EQ(message.obstacles().size(), 2u);
-  const auto& gone = message.obstacles()[0];
-  EXPECT_EQ(gone.action(), 2);
-  EXPECT_EQ(gone.id(), 2);
-  EXPECT_EQ(gone.source(), "here");
-  const auto& added = message.obstacles()[1];
+  const auto message =
+      obstacles_message({{object.id, object}}, classes, {"here", "L2", 2.25}, 7'000'000'001, "map");
+  ASSERT_EQ(message.obstacles().size(), 1u);
+  const auto& added = message.obstacles()[0];
+  EXPECT_EQ(added.source(), "here");
   EXPECT_EQ(added.action(), 1);
   EXPECT_EQ(added.id(), 4);
   EXPECT_EQ(added.level_name(), "L2");

@@ -76,7 +76,7 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
 
 StateRun run_states(const StateTruth& truth, const std::filesystem::path& folder,
                     const PipelineConfig& config,
-                    const std::function<void(const StateRun&)>& done) {
+                    const std::function<void(const StateRun&)>& done, bool with_masks) {
   StateRun run;
   run.expected = expected_states(truth, folder);
   DatasetOptions options = state_dataset(truth, folder);
@@ -86,8 +86,9 @@ StateRun run_states(const StateTruth& truth, const std::filesystem::path& folder
   for (const ExpectedState& expected : run.expected) {
     run.events.emplace_back();
     for (int i = 0; i < truth.frames_per_state; ++i) {
-      const auto frame = reader->next();
+      auto frame = reader->next();
       if (!frame) break;
+      if (!with_masks) frame->labels = cv::Mat();
       const FrameResult result = pipeline.process_frame(*frame);
       run.events.back().insert(run.events.back().end(), result.events.begin(), result.events.end());
     }

@@ -16,6 +16,7 @@
 #include "operator_acts.hpp"
 #include "pipeline_archive.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/segmentation/things.hpp"
 
 namespace pocd {
 namespace {
@@ -135,6 +136,10 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
 
   organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes,
            p.pool, p.cloud);
+  p.mask_missing = p.mask_is_missing(frame);
+  if (frame.labels.empty() && !p.mask_missing && p.config.classes.without_masks == "things") {
+    take_for_things(p.cloud);
+  }
   p.ignored.mark(p.config.map.max_depth_m, p.pool, p.cloud);
   clock.done("organize");
   Frame placed = frame;  // images are shared, not copied
@@ -149,7 +154,6 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   vote_planes(p.planes, segmentation.majority_share, p.cloud);
   p.ground.update(p.planes, segmentation, noise, p.cloud);
   clock.done("clean");
-  p.mask_missing = p.mask_is_missing(frame);
   if (p.mask_missing) {
     // What things are would be a guess: they may be seen to be gone, but nothing is learnt of them.
     p.observations.list.clear();

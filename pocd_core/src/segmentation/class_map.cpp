@@ -70,16 +70,19 @@ std::vector<std::string> ClassMap::inconsistencies() const {
 
 ClassRole ClassMap::role(ClassId id) const {
   const ClassInfo* info = find(list, id);
+  if (!info && id == kThing) return ClassRole::kObject;
   return info ? parse_role(info->role) : ClassRole::kBackground;
 }
 
 int ClassMap::stationarity_class(ClassId id) const {
   const ClassInfo* info = find(list, id);
+  if (!info && id == kThing) return 0;
   return info ? info->stationarity_class : 1;
 }
 
 std::string ClassMap::name(ClassId id) const {
   const ClassInfo* info = find(list, id);
+  if (!info && id == kThing) return "thing";
   return info && !info->name.empty() ? info->name : "class_" + std::to_string(id);
 }
 

@@ -15,6 +15,7 @@ struct Cluster {
   double area_m2 = 0.0;               ///< of the surface that its pixels see, as if facing them
   std::vector<std::int32_t> members;  ///< pixels, row by row
   OrientedBox box;                    ///< not set by find_clusters
+  bool pieced = false;                ///< seen in pieces; not set by find_clusters
 };
 
 /// What find_clusters keeps from frame to frame, so that no memory is asked for per pixel.

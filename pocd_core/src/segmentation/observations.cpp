@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "clusters.hpp"
 #include "pocd/common/cell_index.hpp"
+#include "thing_pieces.hpp"
 
 namespace pocd {
 namespace {
@@ -64,12 +66,34 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
         large.members.insert(large.members.end(), small.members.begin(), small.members.end());
         large.pixels += small.pixels;
         large.area_m2 += small.area_m2;
+        large.pieced |= small.pieced;
         large.box = sample_box(cloud, planes, large.members, memory);
         memory.clusters.members.push_back(std::move(small.members));
         clusters.erase(clusters.begin() + (&small - clusters.data()));
         merged = true;
       }
     }
+  }
+}
+
+/// Makes one cluster of the pieces of a thing. What is one has an instance of its own from then on.
+void join_pieces(const OrganizedCloud& cloud, const SegmentationConfig& config,
+                 const DepthNoise& noise, double spacing_m, const PlaneSegmentation& planes,
+                 std::vector<Cluster>& clusters, Memory& memory) {
+  const auto first_of = find_pieces(cloud, config, noise, spacing_m, planes, clusters);
+  for (std::size_t k = clusters.size(); k-- > 0;) {
+    if (first_of[k] == k) continue;
+    Cluster& whole = clusters[first_of[k]];
+    whole.members.insert(whole.members.end(), clusters[k].members.begin(),
+                         clusters[k].members.end());
+    whole.pixels += clusters[k].pixels;
+    whole.area_m2 += clusters[k].area_m2;
+    whole.pieced = true;
+    memory.clusters.members.push_back(std::move(clusters[k].members));
+    clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  for (Cluster& cluster : clusters) {
+    if (cluster.pieced) std::sort(cluster.members.begin(), cluster.members.end());
   }
 }
 
@@ -185,12 +209,34 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config,
   }
 }
 
+/// Of the observations that are things told by geometry: whether one is mostly one plane, as a piece
+/// of a wall is.
+std::vector<bool> find_flat(const PlaneSegmentation& planes, const Observations& observations) {
+  constexpr double kFlatShare = 0.5;
+  std::vector<std::map<std::uint16_t, int>> counts(observations.list.size());
+  std::vector<bool> flat(observations.list.size(), false);
+  for (std::size_t i = 0; i < observations.observation_of.size(); ++i) {
+    const std::int32_t owner = observations.observation_of[i];
+    if (owner == Observations::kNone || planes.plane_of[i] == PlaneSegmentation::kNoPlane) continue;
+    const auto k = static_cast<std::size_t>(owner);
+    if (observations.list[k].class_id == kThing) ++counts[k][planes.plane_of[i]];
+  }
+  for (std::size_t k = 0; k < flat.size(); ++k) {
+    for (const auto& [plane, count] : counts[k])
+      flat[k] = flat[k] || count > kFlatShare * observations.list[k].pixels;
+  }
+  return flat;
+}
+
 /// Outlines of the observations: where each is cut off.
-void find_cuts(const OrganizedCloud& cloud, const DepthNoise& noise, double spacing_m,
+void find_cuts(const OrganizedCloud& cloud, const SegmentationConfig& config,
+               const DepthNoise& noise, double spacing_m, const PlaneSegmentation& planes,
                Observations& out) {
   struct Outline {
     int length = 0, cut = 0;
     int at_limit = 0;  ///< of the cuts, by the depth limit
+    int hidden = 0;    ///< of the cuts, by something nearer
+    int along = 0;     ///< of things: not cut, and goes on in its plane
   };
   std::vector<Outline> sides(out.list.size()), tops(out.list.size());
   const auto look = [&](std::int32_t i, std::int32_t j, std::vector<Outline>& outlines) {
@@ -208,10 +254,20 @@ void find_cuts(const OrganizedCloud& cloud, const DepthNoise& noise, double spac
       --outline.length;  // a hole tells nothing
     } else if (next < z - step) {
       ++outline.cut;
+      ++outline.hidden;
     } else if (cloud.kind[j] == PixelKind::kNone && next < z + step) {
       ++outline.cut;
       ++outline.at_limit;
     }
+    if (cloud.label[i] != kThing || !(next > z + step)) return;
+    // A wall that is seen along goes on from pixel to pixel with steps like these.
+    const std::uint16_t plane = planes.plane_of[i];
+    const bool goes_on =
+        plane != PlaneSegmentation::kNoPlane &&
+        std::abs(planes.planes[plane].normal_W.dot(cloud.point_W(static_cast<std::size_t>(j))) -
+                 planes.planes[plane].offset_m) <
+            config.plane_tolerance_m + 3.0 * noise.sigma(next);
+    outline.along += goes_on;
   };
   for (std::int32_t row = 0; row < cloud.height; ++row) {
     for (std::int32_t col = 0; col < cloud.width; ++col) {
@@ -222,10 +278,16 @@ void find_cuts(const OrganizedCloud& cloud, const DepthNoise& noise, double spac
       look(i, row > 0 ? i - cloud.width : -1, tops);
     }
   }
+  const std::vector<bool> flat = find_flat(planes, out);
   for (std::size_t k = 0; k < out.list.size(); ++k) {
     const Outline &side = sides[k], &top = tops[k];
     const int length = side.length + top.length;
     if (length > 0) out.list[k].cut_share = static_cast<double>(side.cut + top.cut) / length;
+    if (side.length > 0 && out.list[k].class_id == kThing) {
+      // What stands before a thing hides its end; before a wall it tells nothing.
+      const int ended = side.length - side.cut - side.along + (flat[k] ? 0 : side.hidden);
+      out.list[k].free_beside_share = static_cast<double>(ended) / side.length;
+    }
     // What goes on beyond the depth limit goes on at the same height.
     if (top.length > 0)
       out.list[k].cut_above_share = static_cast<double>(top.cut - top.at_limit) / top.length;
@@ -240,12 +302,18 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
   static thread_local Memory memory;
   std::vector<Cluster> clusters = find_clusters(cloud, config, noise, memory.clusters);
   merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters, memory);
+  if (std::any_of(clusters.begin(), clusters.end(),
+                  [](const Cluster& c) { return c.class_id == kThing; })) {
+    join_pieces(cloud, config, noise, spacing_m, planes, clusters, memory);
+    merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters, memory);
+  }
   out.list.clear();
   out.observation_of.assign(cloud.size(), Observations::kNone);
   for (Cluster& cluster : clusters) {
     Observation observation;
     observation.class_id = cluster.class_id;
-    observation.instance = cluster.instance;
+    observation.instance = cluster.pieced ? static_cast<std::uint16_t>(out.list.size() + 1)
+                                          : cluster.instance;
     observation.pixels = cluster.pixels;
     observation.area_m2 = cluster.area_m2;
     thin(cloud, planes, noise, spacing_m, cluster, memory, observation.points);
@@ -265,7 +333,7 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
     memory.clusters.members.push_back(std::move(cluster.members));
   }
   claim_foot(cloud, config, noise, out);
-  find_cuts(cloud, noise, spacing_m, out);
+  find_cuts(cloud, config, noise, spacing_m, planes, out);
 }
 
 }  // namespace pocd

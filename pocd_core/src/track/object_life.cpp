@@ -327,6 +327,10 @@ void ObjectTracker::confirm_objects(Step& step) {
       continue;
     }
     if (object->observations < needed + wait && origin_in_doubt(*object)) continue;
+    // Of what geometry alone tells, a side must have been seen: it may be a piece of a wall.
+    if (object->class_id == kThing && object->most_free < config_.segmentation.things.side_share) {
+      continue;
+    }
     confirm(step, *object);
   }
 }

@@ -261,6 +261,8 @@ void ObjectTracker::fuse_parts(Step& step) {
     if (!object) object = &create(step, step.observations.list[part.observation].class_id);
     // On a contested surface what was measured may be another place of it.
     if (!part.look || !part.look->contested) fuse(step, *object, part.points);
+    object->most_free = std::max(object->most_free,
+                                 step.observations.list[part.observation].free_beside_share);
     step.owners[p] = object->id;
     if (std::find(seen.begin(), seen.end(), object) == seen.end()) seen.push_back(object);
   }

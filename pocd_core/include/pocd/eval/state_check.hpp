@@ -40,11 +40,12 @@ struct StateRun {
   std::vector<std::vector<ObjectEvent>> events;      ///< during each state
 };
 
-/// Runs the pipeline over the folder and judges it after each state; `done`, if given, is called
-/// then.
+/// Runs the pipeline over the folder, with or without its masks, and judges it after each state;
+/// `done`, if given, is called then.
 StateRun run_states(const StateTruth& truth, const std::filesystem::path& folder,
                     const PipelineConfig& config,
-                    const std::function<void(const StateRun&)>& done = nullptr);
+                    const std::function<void(const StateRun&)>& done = nullptr,
+                    bool with_masks = true);
 
 /// One line with the verdict, then one per object, expected thing and event.
 std::string describe_last_state(const StateRun& run);

@@ -77,6 +77,7 @@ struct LibraryObject {
 
   std::size_t box_surfels = 0;  ///< size of the model when the box was fitted
   std::size_t most_surfels = 0;
+  double most_free = 0.0;  ///< largest Observation::free_beside_share of a look
   /// Alignment target made of the model; dropped when the model changes.
   std::shared_ptr<const IcpTarget> icp_target;
 };

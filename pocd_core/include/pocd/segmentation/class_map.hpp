@@ -19,6 +19,10 @@ namespace pocd {
 /// at all (the robot's own body).
 enum class ClassRole { kBackground, kGround, kObject, kDynamic, kIgnore };
 
+/// Class of what geometry alone tells to be a thing, seen by a robot that sends no masks: movable,
+/// named "thing".
+inline constexpr ClassId kThing = 65535;
+
 /// "r,g,b" with values 0 to 255; nothing for any other text.
 std::optional<std::array<std::uint8_t, 3>> parse_rgb(const std::string& text);
 
@@ -43,6 +47,8 @@ struct ClassInfo {
 struct ClassMap {
   /// Class of every pixel of a frame that has no segmentation image.
   int default_class = 0;
+  /// What a robot sees that never sends masks: "things" by geometry, or all "default_class".
+  std::string without_masks = "things";
   /// Pixel value = class * label_divisor + instance; 1: the value is the class.
   int label_divisor = 1;
   std::vector<ClassInfo> list;
@@ -63,6 +69,9 @@ struct ClassMap {
   void describe(Visitor& visit) {
     visit("default_class", default_class, Range{0, 65535},
           "Class of all pixels when no segmentation image is there.");
+    visit("without_masks", without_masks, Choices{{"things", "default_class"}},
+          "Of a robot that never sends masks: what geometry tells to be movable is a thing (class "
+          "65535), or every pixel has the default class.");
     visit("label_divisor", label_divisor, Range{1, 65535},
           "Pixel value = class * label_divisor + instance (panoptic masks); 1 = the value is the "
           "class.");

@@ -31,6 +31,9 @@ struct Observation {
   /// The same of the upper outline alone, without the depth limit: above a fifth or so, its height is
   /// not known.
   double cut_above_share = 0.0;
+  /// Of a thing told by geometry: share of its left and right outline where nothing cuts it off and
+  /// it does not go on in its plane. 0: it may be a piece of a wall.
+  double free_beside_share = 1.0;
 };
 
 struct Observations {

@@ -5,6 +5,29 @@
 
 namespace pocd {
 
+/// Of a robot that sends no masks: what makes one thing of pieces, and a thing of a piece. Shares, so
+/// that they hold at any scale and distance; lengths are those of the segmentation and of the noise.
+struct ThingsConfig {
+  double behind_share = 0.25;
+  double rim_share = 0.6;
+  double side_share = 0.03;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("behind_share", behind_share, Range{0.05, 1.0},
+          "Two pieces are one thing when, along this share of the smaller one's height or width, the "
+          "plane of each goes on in the other behind something nearer. A quarter: small pieces have "
+          "few pixels whose plane is known.");
+    visit("rim_share", rim_share, Range{0.05, 1.0},
+          "Two pieces are one open container when one is seen over the upper edge of the other along "
+          "this share of the wider one. More than half: a thing behind another one seldom has its "
+          "width and its height.");
+    visit("side_share", side_share, Range{0.0, 1.0},
+          "A thing is reported once this share of its left and right outline was seen to be its "
+          "end, in one look; a piece of a wall has none. Not 0: outlines are ragged.");
+  }
+};
+
 struct SegmentationConfig {
   int stride = 2;
   double plane_max_angle_deg = 12.0;
@@ -17,6 +40,7 @@ struct SegmentationConfig {
   double min_cluster_area_m2 = 0.02;
   int min_cluster_pixels = 40;
   double max_height_m = 2.6;
+  ThingsConfig things;
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -44,6 +68,7 @@ struct SegmentationConfig {
           "Clusters with fewer pixels (after the stride) are dropped.");
     visit("max_height_m", max_height_m, Range{0.1, 100.0},
           "Points higher above the ground than this are background [m].");
+    visit.group("things", things, "Telling things by geometry, for robots that send no masks.");
   }
 };
 
