@@ -236,7 +236,7 @@ void find_cuts(const OrganizedCloud& cloud, const SegmentationConfig& config,
     int length = 0, cut = 0;
     int at_limit = 0;  ///< of the cuts, by the depth limit
     int hidden = 0;    ///< of the cuts, by something nearer
-    int along = 0;     ///< of things: not cut, and goes on in its plane
+    int ended = 0;     ///< of things: what lies behind is seen, and does not go on in its plane
   };
   std::vector<Outline> sides(out.list.size()), tops(out.list.size());
   const auto look = [&](std::int32_t i, std::int32_t j, std::vector<Outline>& outlines) {
@@ -267,7 +267,7 @@ void find_cuts(const OrganizedCloud& cloud, const SegmentationConfig& config,
         std::abs(planes.planes[plane].normal_W.dot(cloud.point_W(static_cast<std::size_t>(j))) -
                  planes.planes[plane].offset_m) <
             config.plane_tolerance_m + 3.0 * noise.sigma(next);
-    outline.along += goes_on;
+    outline.ended += !goes_on;
   };
   for (std::int32_t row = 0; row < cloud.height; ++row) {
     for (std::int32_t col = 0; col < cloud.width; ++col) {
@@ -285,7 +285,7 @@ void find_cuts(const OrganizedCloud& cloud, const SegmentationConfig& config,
     if (length > 0) out.list[k].cut_share = static_cast<double>(side.cut + top.cut) / length;
     if (side.length > 0 && out.list[k].class_id == kThing) {
       // What stands before a thing hides its end; before a wall it tells nothing.
-      const int ended = side.length - side.cut - side.along + (flat[k] ? 0 : side.hidden);
+      const int ended = side.ended + (flat[k] ? 0 : side.hidden);
       out.list[k].free_beside_share = static_cast<double>(ended) / side.length;
     }
     // What goes on beyond the depth limit goes on at the same height.

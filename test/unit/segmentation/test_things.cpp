@@ -62,7 +62,7 @@ TEST(Things, TwoBoxesApartAreTwo) {
   for (const Observation& o : s.observations.list) {
     EXPECT_EQ(o.class_id, kThing);
     EXPECT_EQ(o.instance, 0);
-    EXPECT_GT(o.free_beside_share, 0.5);
+    EXPECT_GT(o.free_beside_share, SegmentationConfig().things.side_share);
   }
 }
 
