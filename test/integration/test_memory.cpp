@@ -216,8 +216,7 @@ TEST_F(NodeMemoryTest, WhatAnOperatorSaysIsFollowedRecordedAndAnswered) {
     return run_command(words);
   };
   const WatchedObject object = heard.objects().begin()->second;
-  const CommandResult forgotten =
-      say({"forget-object", std::to_string(to_index(object.state.id))});
+  const CommandResult forgotten = say({"forget-object", std::to_string(to_index(object.state.id))});
   EXPECT_EQ(forgotten.exit_code, 0) << forgotten.err;
   EXPECT_NE(forgotten.out.find("done: 1 object forgotten; event "), std::string::npos)
       << forgotten.out;
@@ -254,8 +253,8 @@ TEST_F(NodeMemoryTest, ACommandThatComesAgainIsAnsweredAndNotFollowedAgain) {
   const auto participant = test_participant(domain_);
   dds::Wakeup wakeup;
   dds::Writer<pocd_msgs::msg::CommandPubSubType> commands(participant, dds::topics::kCommand);
-  dds::Reader<pocd_msgs::msg::CommandReplyPubSubType> replies(
-      participant, dds::topics::kCommandReply, wakeup);
+  dds::Reader<pocd_msgs::msg::CommandReplyPubSubType> replies(participant,
+                                                              dds::topics::kCommandReply, wakeup);
   ASSERT_TRUE(eventually([&] { return commands.matched() > 0 && replies.matched() > 0; }));
   const auto say = [&](std::uint64_t number, std::uint8_t kind, const std::string& by) {
     pocd_msgs::msg::Command command;
@@ -289,9 +288,8 @@ TEST_F(NodeMemoryTest, WithoutCommandsNobodyListens) {
   Process quiet(node());
   ASSERT_TRUE(
       eventually([&] { return quiet.err().find("running on domain") != std::string::npos; }));
-  const CommandResult said = run_command({bin("pocd_command"), "reset", "--by", "mira",
-                                          "--timeout", "2", "--domain",
-                                          domain_.text()});
+  const CommandResult said = run_command(
+      {bin("pocd_command"), "reset", "--by", "mira", "--timeout", "2", "--domain", domain_.text()});
   EXPECT_EQ(said.exit_code, 1);
   EXPECT_NE(said.err.find("node.commands"), std::string::npos) << said.err;
   quiet.signal(SIGINT);

@@ -85,6 +85,7 @@ class MemoryRunner {
     memory_.emplace(memory, config.map);
     memory_->restore(pipeline_, publisher_);
     if (memory_->holds_something()) unarchive(memory_->progress(), "progress", next_);
+    stamp_ns_ = memory_->stamp_ns();
     memory_->start(pipeline_, config.classes, {7, "test", 0});
   }
 

@@ -9,7 +9,8 @@ namespace pocd::test {
 std::vector<std::string> stored_pieces(const std::filesystem::path& folder) {
   memory::Database database(folder / memory::kFileName, memory::Database::Access::kRead);
   std::vector<std::string> rows;
-  for (const char* table : {"parts", "objects", "free_space", "regions", "tiles", "voxel_index", "voxels"}) {
+  for (const char* table :
+       {"parts", "objects", "free_space", "regions", "tiles", "voxel_index", "voxels"}) {
     memory::Statement all(
         database, (std::string("SELECT key, data FROM ") + table + " ORDER BY key").c_str());
     while (all.step()) {
@@ -35,7 +36,8 @@ std::optional<OperatorWord> circuit_words(std::uint64_t frames, const PocdPipeli
   if (known.empty()) return std::nullopt;
   word.object = known.front().id;
   const Eigen::Vector2d at = known.front().box.pose.position_W.head<2>();
-  for (const auto& corner : {Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, -1), Eigen::Vector2d(0, 1)})
+  for (const auto& corner :
+       {Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, -1), Eigen::Vector2d(0, 1)})
     word.polygon_W.push_back(at + corner);
   switch (frames / sixth) {
     case 2:

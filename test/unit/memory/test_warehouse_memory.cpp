@@ -9,8 +9,8 @@
 #include "memory/database.hpp"
 #include "memory/schema.hpp"
 #include "memory_run.hpp"
-#include "pocd/common/random.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/random.hpp"
 
 namespace pocd::test {
 namespace {
@@ -291,10 +291,11 @@ TEST(WarehouseMemory, ALargePlaceIsThereSoon) {
   const double first_s = since_s();
   EXPECT_EQ(again.publisher().tiles().size(), tiles);
   EXPECT_LT(first_s, 3.0 + 1e-4 * area_m2);
-  std::printf("%g m2, %llu tiles, %.1f MB: restored in %.2f s, first frame published after %.2f s\n",
-              area_m2, static_cast<unsigned long long>(tiles),
-              1e-6 * static_cast<double>(MemoryReader(folder / "memory").info().file_bytes),
-              restored_s, first_s);
+  std::printf(
+      "%g m2, %llu tiles, %.1f MB: restored in %.2f s, first frame published after %.2f s\n",
+      area_m2, static_cast<unsigned long long>(tiles),
+      1e-6 * static_cast<double>(MemoryReader(folder / "memory").info().file_bytes), restored_s,
+      first_s);
 }
 
 }  // namespace
