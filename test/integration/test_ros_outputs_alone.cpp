@@ -104,7 +104,9 @@ TEST(RosOutputsAlone, ObstaclesAreRefreshedInTimeAndGoByLapse) {
       ASSERT_EQ(ends_ns.size(), 1u) << second;
     }
     for (const auto& [id, end_ns] : ends_ns) {
-      if (tick < 100 || id == 1) EXPECT_GT(end_ns, stamp(second + 0.5)) << id;
+      if (tick < 100 || id == 1) {
+        EXPECT_GT(end_ns, stamp(second + 0.5)) << id;
+      }
     }
   }
   // Best effort, and yet exact: the reader shares the participant of the writer.

@@ -41,7 +41,8 @@ TEST(MapPublisher, TilesHoldTheMapWithinTheQuantisation) {
 }
 
 TEST(MapPublisher, DeltasCarryExactlyWhatChanged) {
-  const TsdfConfig config = coarse_config();
+  TsdfConfig config = coarse_config();
+  config.min_publish_weight = 2;
   TsdfMap map(config);
   ThreadPool pool(1);
   MapPublisher publisher(42, config);
@@ -50,7 +51,7 @@ TEST(MapPublisher, DeltasCarryExactlyWhatChanged) {
 
   const Pose pose = camera_pose({0, 0, 1}, 0, 0);
   map.integrate(look(ball_scene(0), pose).input(), pool);
-  // Weight 1 is below the publishing threshold of 2.
+  // Weight 1 is below the threshold.
   EXPECT_FALSE(publisher.update(map));
   map.integrate(look(ball_scene(0), pose).input(), pool);
   const auto first = publisher.update(map);
