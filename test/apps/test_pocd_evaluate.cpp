@@ -72,7 +72,7 @@ TEST(PocdEvaluate, SimChangesEveryScenario) {
     return std::stod(scores(folder.path()).at(0).at("recall_truth"));
   };
   EXPECT_GT(recall({"--seeds", "1"}), 90.0);
-  EXPECT_LT(recall({"--seeds", "1", "--sim", "sensor.random_hole_share=0.95"}), 60.0)
+  EXPECT_LT(recall({"--seeds", "1", "--sim", "sensor.random_hole_share=0.99"}), 60.0)
       << "the sensor hardly sees anything";
 }
 

@@ -32,7 +32,9 @@ struct OutputsInSimulatedTime {
     outputs.send();
   }
   void put(int id) {
-    objects[static_cast<ObjectId>(id)].id = static_cast<ObjectId>(id);
+    ObjectSnapshot& object = objects[static_cast<ObjectId>(id)];
+    object.id = static_cast<ObjectId>(id);
+    object.box.size_m = {1.0, 1.0, 1.0};
     touched.insert(static_cast<ObjectId>(id));
   }
   void remove(int id) {

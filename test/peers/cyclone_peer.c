@@ -333,6 +333,11 @@ int main(int argc, char** argv) {
     said = true;
   }
   drain_all(&all);
+  fprintf(stderr, "holds version %llu of %llu%s, %lld of %lld tiles, %lld of %lld objects\n",
+          (unsigned long long)all.version, (unsigned long long)all.last.version,
+          all.last.final_version ? " (final)" : "", (long long)all.tiles_alive,
+          (long long)all.last.tile_count, (long long)all.objects_alive,
+          (long long)all.last.object_count);
   dds_delete(bus);
   return fclose(log_file) == 0 ? 0 : 1;
 }
