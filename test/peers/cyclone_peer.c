@@ -150,9 +150,16 @@ static bool send_frame(const Robot* robot, FILE* file, const uint32_t size[2],
 
 // ---- what a subscriber hears ----
 
+// Which instances of a topic are alive. A reader that was not asked in time hears of a state and of
+// the dispose after it in one sample, by its instance state.
+typedef struct {
+  dds_instance_handle_t* handles;
+  size_t count, room;
+} Alive;
+
 typedef struct {
   dds_entity_t objects, events, tiles, deltas, manifest;
-  uint32_t objects_alive, tiles_alive;
+  Alive objects_alive, tiles_alive;
   uint64_t version;
   uint32_t parts;
   pocd_msgs_msg_dds__MapManifest_ last;
@@ -185,21 +192,54 @@ static bool drain(Subscriber* self, dds_entity_t from, Handler handle) {
   return count > 0;
 }
 
+static size_t find_alive(const Alive* alive, dds_instance_handle_t handle) {
+  size_t i = 0;
+  while (i < alive->count && alive->handles[i] != handle) ++i;
+  return i;
+}
+
+static void add_alive(Alive* alive, dds_instance_handle_t handle) {
+  if (find_alive(alive, handle) < alive->count) return;
+  if (alive->count == alive->room) {
+    alive->room = alive->room == 0 ? 64 : 2 * alive->room;
+    alive->handles = realloc(alive->handles, alive->room * sizeof *alive->handles);
+    if (!alive->handles) fail("no memory");
+  }
+  alive->handles[alive->count++] = handle;
+}
+
+// False when it was not alive.
+static bool remove_alive(Alive* alive, dds_instance_handle_t handle) {
+  const size_t i = find_alive(alive, handle);
+  if (i == alive->count) return false;
+  alive->handles[i] = alive->handles[--alive->count];
+  return true;
+}
+
 // 'p' present, 'd' disposed, 'w' lost its writers.
 static char state_of(const dds_sample_info_t* info) {
   if (info->valid_data) return 'p';
   return info->instance_state == DDS_IST_NOT_ALIVE_DISPOSED ? 'd' : 'w';
 }
 
-static void on_object(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
-  const pocd_msgs_msg_dds__ObjectState_* object = sample;
-  const char kind = 'O', state = state_of(info);
+static void put_object(char state, const pocd_msgs_msg_dds__ObjectState_* object, uint32_t id) {
+  const char kind = 'O';
   PUT(kind), PUT(state);
   put(object->uuid, sizeof object->uuid);
-  const uint32_t id = info->valid_data ? object->local_id : 0;
   PUT(id);
-  if (info->valid_data && info->view_state == DDS_VST_NEW) ++self->objects_alive;
-  if (state == 'd') --self->objects_alive;
+}
+
+static void on_object(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
+  const pocd_msgs_msg_dds__ObjectState_* object = sample;
+  if (info->valid_data) {
+    put_object('p', object, object->local_id);
+    add_alive(&self->objects_alive, info->instance_handle);
+  } else if (state_of(info) == 'w') {
+    put_object('w', object, 0);
+  }
+  const bool disposed = info->instance_state == DDS_IST_NOT_ALIVE_DISPOSED;
+  if (disposed && remove_alive(&self->objects_alive, info->instance_handle))
+    put_object('d', object, 0);
 }
 
 static void on_event(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
@@ -217,13 +257,22 @@ static void put_payload(uint64_t version, const uint8_t* data, uint32_t size) {
   put(data, size);
 }
 
+static void put_tile(char state, const pocd_msgs_msg_dds__MapTile_* tile) {
+  const char kind = 'T';
+  PUT(kind), PUT(state), PUT(tile->x), PUT(tile->y), PUT(tile->z);
+}
+
 static void on_tile(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
   const pocd_msgs_msg_dds__MapTile_* tile = sample;
-  const char kind = 'T', state = state_of(info);
-  PUT(kind), PUT(state), PUT(tile->x), PUT(tile->y), PUT(tile->z);
-  if (info->valid_data) put_payload(tile->version, tile->payload._buffer, tile->payload._length);
-  if (info->valid_data && info->view_state == DDS_VST_NEW) ++self->tiles_alive;
-  if (state == 'd') --self->tiles_alive;
+  if (info->valid_data) {
+    put_tile('p', tile);
+    put_payload(tile->version, tile->payload._buffer, tile->payload._length);
+    add_alive(&self->tiles_alive, info->instance_handle);
+  } else if (state_of(info) == 'w') {
+    put_tile('w', tile);
+  }
+  const bool disposed = info->instance_state == DDS_IST_NOT_ALIVE_DISPOSED;
+  if (disposed && remove_alive(&self->tiles_alive, info->instance_handle)) put_tile('d', tile);
 }
 
 static void on_delta(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
@@ -255,8 +304,8 @@ static void on_manifest(Subscriber* self, const void* sample, const dds_sample_i
 
 static bool converged(const Subscriber* self) {
   return self->last.final_version && self->version == self->last.version &&
-         self->tiles_alive == self->last.tile_count &&
-         self->objects_alive == self->last.object_count;
+         self->tiles_alive.count == self->last.tile_count &&
+         self->objects_alive.count == self->last.object_count;
 }
 
 static void drain_all(Subscriber* self) {
@@ -335,8 +384,8 @@ int main(int argc, char** argv) {
   drain_all(&all);
   fprintf(stderr, "holds version %llu of %llu%s, %lld of %lld tiles, %lld of %lld objects\n",
           (unsigned long long)all.version, (unsigned long long)all.last.version,
-          all.last.final_version ? " (final)" : "", (long long)all.tiles_alive,
-          (long long)all.last.tile_count, (long long)all.objects_alive,
+          all.last.final_version ? " (final)" : "", (long long)all.tiles_alive.count,
+          (long long)all.last.tile_count, (long long)all.objects_alive.count,
           (long long)all.last.object_count);
   dds_delete(bus);
   return fclose(log_file) == 0 ? 0 : 1;
