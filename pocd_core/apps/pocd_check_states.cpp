@@ -15,13 +15,12 @@ int check_states(const std::filesystem::path& folder, const std::filesystem::pat
                  const pocd::PipelineConfig& config, bool with_masks) {
   pocd::StateTruth truth;
   pocd::load_config(truth, {truth_file});
-  const pocd::StateRun run =
-      pocd::run_states(
-          truth, folder, config,
-          [](const pocd::StateRun& so_far) {
-            std::cout << pocd::describe_last_state(so_far) << std::flush;
-          },
-          with_masks);
+  const pocd::StateRun run = pocd::run_states(
+      truth, folder, config,
+      [](const pocd::StateRun& so_far) {
+        std::cout << pocd::describe_last_state(so_far) << std::flush;
+      },
+      with_masks);
   std::size_t listed = 0, box = 0;
   for (const pocd::StateVerdict& verdict : run.verdicts) {
     listed += verdict.ok_listed;
@@ -79,7 +78,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", POCD_VERSION);
   auto* states_option =
       app.add_option("--states", states, "Folder of labelled PCD files, one per state");
-  app.add_flag("!--no-masks", with_masks, "Leave the labels out: what is a thing is told by geometry")
+  app.add_flag("!--no-masks", with_masks,
+               "Leave the labels out: what is a thing is told by geometry")
       ->needs(states_option);
   app.add_option("--truth", truth, "Truth of the states (YAML)")->needs(states_option);
   auto* still_option = app.add_option("--still", still, "Folder of frames in the rgbd layout");

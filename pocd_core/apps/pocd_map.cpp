@@ -58,9 +58,10 @@ int main(int argc, char** argv) {
   app.add_option_function<std::string>(
       "--threads", [&](const std::string& n) { overrides.push_back("threads=" + n); },
       "Threads; results do not depend on it");
-  app.add_option("--network", options.network,
-                 "ONNX model, with its description beside it (docs/segmentation.md), that makes the "
-                 "masks from the colour images; masks of the inputs are not used");
+  app.add_option(
+      "--network", options.network,
+      "ONNX model, with its description beside it (docs/segmentation.md), that makes the "
+      "masks from the colour images; masks of the inputs are not used");
   app.add_option("--output", options.output, "Folder for the results, made if missing")->required();
   app.add_option("--max-frames", options.max_frames, "Stop after that many good frames")
       ->check(CLI::Range(1, 1000000000));

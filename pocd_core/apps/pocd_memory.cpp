@@ -22,8 +22,8 @@ void show_info(const std::filesystem::path& folder) {
               info.ended_clean ? "true" : "false", info.stamp_ns);
   std::printf("map_version: %" PRIu64 "\nmap_digest: %s\n", info.map_version,
               info.digest.hex().c_str());
-  std::printf("objects: %" PRIu64 "\nfree_blocks: %" PRIu64 "\ntiles: %" PRIu64 "\nvoxel_tiles: %" PRIu64
-              "\n",
+  std::printf("objects: %" PRIu64 "\nfree_blocks: %" PRIu64 "\ntiles: %" PRIu64
+              "\nvoxel_tiles: %" PRIu64 "\n",
               info.objects, info.free_blocks, info.tiles, info.voxel_tiles);
   std::printf("events: %" PRIu64 "\nfirst_event: %" PRIu64 "\nlast_event: %" PRIu64
               "\nevent_bytes: %" PRIu64 "\nfile_bytes: %" PRIu64 "\nruns:\n",
@@ -107,8 +107,9 @@ int main(int argc, char** argv) {
   };
   add("info", "What it holds, as YAML");
   add("verify", "Reads everything; one line for each thing that is wrong");
-  add("export", "Map file, all events, the last event of everything that stands, and when each region was\n"
-               "last looked at (CSV)")
+  add("export",
+      "Map file, all events, the last event of everything that stands, and when each region was\n"
+      "last looked at (CSV)")
       ->add_option("--output", output, "Folder for the files, made if missing")
       ->required();
   add("compact", "Gives room that is not used any more back to the disk; not while a node runs");

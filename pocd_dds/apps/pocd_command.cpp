@@ -187,8 +187,7 @@ int main(int argc, char** argv) {
   add("reset", "Everything is known no more", WordKind::kReset);
   add("save", "The memory is written at once", WordKind::kSave);
   app.add_option("--by", options.by, "Who says so, for the log")->envname("USER")->required();
-  app.add_option("--map-id", options.map_id, "node.map_id of the component")
-      ->capture_default_str();
+  app.add_option("--map-id", options.map_id, "node.map_id of the component")->capture_default_str();
   app.add_option("--timeout", options.timeout_s, "Seconds to wait for the answer")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();

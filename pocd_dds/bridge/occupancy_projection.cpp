@@ -32,8 +32,7 @@ OccupancyProjection::Cells OccupancyProjection::project(const MapTile& tile) con
 }
 
 void OccupancyProjection::apply(const std::vector<MapTile>& changed,
-                                const std::vector<TileKey>& removed,
-                                const std::set<TileKey>& old) {
+                                const std::vector<TileKey>& removed, const std::set<TileKey>& old) {
   for (const MapTile& tile : changed) {
     const Tower tower{tile.key.x, tile.key.y};
     towers_[tower][tile.key.z] = {project(tile), old.count(tile.key) > 0};

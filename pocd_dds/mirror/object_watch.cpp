@@ -120,9 +120,9 @@ void ObjectWatch::Impl::take_states() {
     }
     taken = true;
     Known& entry = known[state.uuid()];
-    entry = {{state.uuid(), state.epoch(), state.lineage(), state.class_name(),
-              dds::object_from(state)},
-             meta.writer};
+    entry = {
+        {state.uuid(), state.epoch(), state.lineage(), state.class_name(), dds::object_from(state)},
+        meta.writer};
     if (!options.on_object) return;
     callbacks.call([this, object = entry.object] { options.on_object(object); });
   });

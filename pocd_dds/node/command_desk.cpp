@@ -61,7 +61,8 @@ void CommandDesk::take(const pocd_msgs::msg::Command& command) {
     word.kind = static_cast<WordKind>(command.kind());
     word.region = command.region();
     word.by = command.by();
-    for (const auto& corner : command.polygon()) word.polygon_W.emplace_back(corner.x(), corner.y());
+    for (const auto& corner : command.polygon())
+      word.polygon_W.emplace_back(corner.x(), corner.y());
     if (names_object(word.kind)) {
       if (const auto id = object_of(command.uuid(), run_)) {
         word.object = *id;
@@ -70,9 +71,8 @@ void CommandDesk::take(const pocd_msgs::msg::Command& command) {
       }
     }
   }
-  const auto waiting = std::count_if(cases_.begin(), cases_.end(), [](const Case& c) {
-    return c.state == Case::State::kWaits;
-  });
+  const auto waiting = std::count_if(cases_.begin(), cases_.end(),
+                                     [](const Case& c) { return c.state == Case::State::kWaits; });
   if (wrong.empty() && static_cast<std::size_t>(waiting) >= kMostWaiting) {
     wrong = std::to_string(kMostWaiting) + " commands wait already";
   }

@@ -29,8 +29,8 @@ class CommandDesk {
   /// An answer does not wait longer for the disk.
   static constexpr std::chrono::seconds kWaitStored{10};
 
-  /// `run` names the objects that are known. `wakeup` is woken by commands and by what was done, and
-  /// must outlive it.
+  /// `run` names the objects that are known. `wakeup` is woken by commands and by what was done,
+  /// and must outlive it.
   CommandDesk(const std::shared_ptr<Participant>& participant, const MapRun& run, Wakeup& wakeup);
 
   // The thread of the bus:
@@ -65,7 +65,7 @@ class CommandDesk {
   Wakeup& wakeup_;
   Writer<pocd_msgs::msg::CommandReplyPubSubType> replies_;
   Reader<pocd_msgs::msg::CommandPubSubType> commands_;
-  std::mutex mutex_;         // guards what follows
+  std::mutex mutex_;        // guards what follows
   std::deque<Case> cases_;  // in the order in which they came
 };
 

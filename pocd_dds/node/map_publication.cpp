@@ -218,7 +218,8 @@ void MapPublication::count_problems(ProblemCounter& problems) {
 
 std::size_t MapPublication::waiting() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::size_t messages = tiles_waiting_.size() + kept_waiting_.size() + (reply_waiting_ ? reply_waiting_->left() : 0);
+  std::size_t messages =
+      tiles_waiting_.size() + kept_waiting_.size() + (reply_waiting_ ? reply_waiting_->left() : 0);
   for (const DeltaParts& step : deltas_waiting_) messages += step.left();
   return messages;
 }

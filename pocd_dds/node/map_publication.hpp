@@ -28,8 +28,8 @@ namespace pocd::dds {
 /// writes to the bus while the other has to wait for it.
 class MapPublication {
  public:
-  /// `wakeup` is woken by requests for snapshots and by new steps, and must outlive it. `lineage` is
-  /// that of the memory; 0: the epoch, without one.
+  /// `wakeup` is woken by requests for snapshots and by new steps, and must outlive it. `lineage`
+  /// is that of the memory; 0: the epoch, without one.
   MapPublication(const std::shared_ptr<Participant>& participant, const NodeFile& config,
                  std::uint64_t epoch, Wakeup& wakeup, std::uint64_t lineage = 0);
 

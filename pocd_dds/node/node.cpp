@@ -56,13 +56,12 @@ struct Node::Impl {
         objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
         map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
         feed(keeper.on() ? std::make_unique<EventFeed>(participant, config, wakeup) : nullptr),
-        desk(config.node.commands
-                 ? std::make_unique<CommandDesk>(
-                       participant,
-                       MapRun{static_cast<std::uint32_t>(config.node.map_id), options.epoch,
-                              keeper.lineage(options.epoch)},
-                       wakeup)
-                 : nullptr),
+        desk(config.node.commands ? std::make_unique<CommandDesk>(
+                                        participant,
+                                        MapRun{static_cast<std::uint32_t>(config.node.map_id),
+                                               options.epoch, keeper.lineage(options.epoch)},
+                                        wakeup)
+                                  : nullptr),
         restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
         status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
         health(config.node.health_window_s, config.node.stall_s),

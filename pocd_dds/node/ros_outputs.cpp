@@ -172,9 +172,8 @@ void RosOutputs::send_markers() {
 }
 
 void RosOutputs::send_obstacles() {
-  auto message =
-      obstacles_message(objects_, config_.pipeline.classes, obstacle_options_, now_ns_,
-                        config_.node.map_frame);
+  auto message = obstacles_message(objects_, config_.pipeline.classes, obstacle_options_, now_ns_,
+                                   config_.node.map_frame);
   if (!message.obstacles().empty()) obstacles_->write(message);
 }
 

@@ -46,7 +46,7 @@ struct WorkStatus {
   MapTraffic map;
   MapMemoryStatus memory;
   std::optional<MemoryStatus> kept;  ///< without a value: nothing is kept
-  StampNs stamp_ns = 0;  ///< of the last frame
+  StampNs stamp_ns = 0;              ///< of the last frame
   /// Longest time of the last second from the last image of a frame to its map delta [ms].
   double latency_ms = 0.0;
   /// CPU time so far [ms]: all threads of the pipeline; publishing; the thread that takes from the

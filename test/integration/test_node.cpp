@@ -283,8 +283,8 @@ TEST(Node, IsHeardWhileItEmptiesItsQueue) {
 TEST(Commands, SayAsMuchAsIsWantedAndAsJsonLines) {
   const TestDomain domain;
   const auto said = [&](const std::vector<std::string>& more) {
-    auto command = std::vector<std::string>{bin("pocd_mirror"), "--timeout", "0.5", "--domain",
-                                            domain.text()};
+    auto command =
+        std::vector<std::string>{bin("pocd_mirror"), "--timeout", "0.5", "--domain", domain.text()};
     command.insert(command.end(), more.begin(), more.end());
     return run_command(command).err;
   };

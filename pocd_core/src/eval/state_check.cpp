@@ -75,8 +75,8 @@ StateVerdict judge_state(const std::vector<ObjectSnapshot>& objects, const Expec
 }
 
 StateRun run_states(const StateTruth& truth, const std::filesystem::path& folder,
-                    const PipelineConfig& config,
-                    const std::function<void(const StateRun&)>& done, bool with_masks) {
+                    const PipelineConfig& config, const std::function<void(const StateRun&)>& done,
+                    bool with_masks) {
   StateRun run;
   run.expected = expected_states(truth, folder);
   DatasetOptions options = state_dataset(truth, folder);

@@ -59,8 +59,8 @@ std::size_t TsdfMap::clear_object(ObjectId id) {
   return clear_object_where(id, [](const Eigen::Vector3d&) { return true; });
 }
 
-std::size_t TsdfMap::clear_object_where(
-    ObjectId id, const std::function<bool(const Eigen::Vector3d&)>& inside) {
+std::size_t TsdfMap::clear_object_where(ObjectId id,
+                                        const std::function<bool(const Eigen::Vector3d&)>& inside) {
   const std::uint32_t owner = to_index(id);
   if (owner == 0) return 0;
   impl_->settle_touched();

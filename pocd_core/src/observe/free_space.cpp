@@ -17,25 +17,27 @@ int floor_div(double v, double size) { return static_cast<int>(std::floor(v / si
 
 FreeSpace::FreeSpace(double cell_m) : cell_m_(cell_m) { POCD_CHECK(cell_m > 0.0); }
 
-bool FreeSpace::seen_empty(const Eigen::Vector3f& point_W) const {
+FreeSpace::Place FreeSpace::place_of(const Eigen::Vector3f& point_W) const {
   const int x = floor_div(point_W.x(), cell_m_), y = floor_div(point_W.y(), cell_m_),
             z = floor_div(point_W.z(), cell_m_);
-  const auto it = blocks_.find({x >> 3, y >> 3, z >> 3});
-  return it != blocks_.end() && (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] >= kLooks;
+  return {{x >> 3, y >> 3, z >> 3}, (x & 7) + 8 * ((y & 7) + 8 * (z & 7))};
+}
+
+bool FreeSpace::seen_empty(const Eigen::Vector3f& point_W) const {
+  const Place place = place_of(point_W);
+  const auto it = blocks_.find(place.block);
+  return it != blocks_.end() && (*it->second)[place.cell] >= kLooks;
 }
 
 void FreeSpace::forget_behind(const Eigen::Vector3f& eye_W, const Eigen::Vector3f& surface_W,
                               double depth_m) {
   const Eigen::Vector3f along = (surface_W - eye_W).normalized();
   for (double at = 0.0; at <= depth_m; at += 0.5 * cell_m_) {
-    const Eigen::Vector3f p = surface_W + static_cast<float>(at) * along;
-    const int x = floor_div(p.x(), cell_m_), y = floor_div(p.y(), cell_m_),
-              z = floor_div(p.z(), cell_m_);
-    const BlockKey key{x >> 3, y >> 3, z >> 3};
-    const auto it = blocks_.find(key);
+    const Place place = place_of(surface_W + static_cast<float>(at) * along);
+    const auto it = blocks_.find(place.block);
     if (it == blocks_.end()) continue;
-    (*it->second)[(x & 7) + 8 * ((y & 7) + 8 * (z & 7))] = 0;
-    if (notes_changes_) changed_.insert(key);
+    (*it->second)[place.cell] = 0;
+    if (notes_changes_) changed_.insert(place.block);
   }
 }
 

@@ -274,4 +274,49 @@ std::vector<Part> divide(const Observations& observations, Look* looks, std::siz
   return parts;
 }
 
+void paint_owners(const Observations& observations, const std::vector<Part>& parts,
+                  const std::vector<ObjectId>& owners, const OrganizedCloud& cloud,
+                  double spacing_m, std::vector<std::uint32_t>& owner_of_pixel) {
+  struct Owners {
+    std::vector<std::size_t> parts;
+    std::uint32_t main = 0;
+    bool one = true;
+    CellIndex cells;
+  };
+  std::vector<Owners> all(observations.list.size());
+  for (std::size_t p = 0; p < parts.size(); ++p) all[parts[p].observation].parts.push_back(p);
+  const float inverse = static_cast<float>(1.0 / spacing_m);
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    Owners& o = all[j];
+    std::size_t most = 0, points = 0;
+    for (const std::size_t p : o.parts) {
+      points += parts[p].points.size();
+      if (parts[p].points.size() > most)
+        most = parts[p].points.size(), o.main = to_index(owners[p]);
+    }
+    o.one = points == observations.list[j].points.size() &&
+            std::all_of(o.parts.begin(), o.parts.end(),
+                        [&](std::size_t p) { return to_index(owners[p]) == o.main; });
+    if (o.one) continue;
+    for (const std::size_t p : o.parts) {
+      for (const SurfacePoint& point : parts[p].points) {
+        o.cells.insert(cell_key(point.point_W, inverse),
+                       static_cast<std::int32_t>(to_index(owners[p])));
+      }
+    }
+  }
+  owner_of_pixel.assign(cloud.size(), 0);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const std::int32_t j = observations.observation_of[i];
+    if (j == Observations::kNone) continue;
+    const Owners& o = all[j];
+    if (o.one) {
+      owner_of_pixel[i] = o.main;
+      continue;
+    }
+    const std::int32_t owner = o.cells.find(cell_key(cloud.point_W(i), inverse));
+    owner_of_pixel[i] = owner == CellIndex::kNone ? 0 : static_cast<std::uint32_t>(owner);
+  }
+}
+
 }  // namespace pocd

@@ -63,9 +63,8 @@ class Row {
 
   EventKind kind() const {
     const std::string& word = text("kind");
-    for (const EventKind kind :
-         {EventKind::kAdded, EventKind::kUpdated, EventKind::kMoved, EventKind::kRemoved,
-          EventKind::kOperator}) {
+    for (const EventKind kind : {EventKind::kAdded, EventKind::kUpdated, EventKind::kMoved,
+                                 EventKind::kRemoved, EventKind::kOperator}) {
       if (word == to_string(kind)) return kind;
     }
     throw InputError(where_ + ": kind \"" + word + "\" is unknown");

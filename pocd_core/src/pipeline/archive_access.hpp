@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "archive_object.hpp"
 #include "../track/object_tracker.hpp"
+#include "archive_object.hpp"
 #include "frame_clock.hpp"
 #include "ignored_regions.hpp"
 #include "looked_at.hpp"
@@ -56,7 +56,8 @@ struct ArchiveAccess {
     a(list, moves);
   }
 
-  /// First all first bytes of a field, then all second ones, and so on: they are alike and compress.
+  /// First all first bytes of a field, then all second ones, and so on: they are alike and
+  /// compress.
   template <class Archive, class T>
   static void by_planes(Archive& a, std::vector<Surfel>& surfels, T Surfel::*field) {
     std::vector<std::uint8_t> plane(surfels.size());

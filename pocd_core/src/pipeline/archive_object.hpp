@@ -27,10 +27,10 @@ void archive(Archive& a, Moment& moment) {
 template <class Archive>
 void archive(Archive& a, LibraryObject& object) {
   auto& [id, class_id, stationarity_class, model, box, centroid_W, belief, arrival, moved,
-         first_seen_ns, last_seen_ns, in_reach_ns, visit_ns, placed_ns, in_place_ns, last_robot, seen_by, moment, observations,
-         confirmed, added_ns, reported_box, changed, looks_missed, looks_unobserved,
-         unobserved_since_ns, looks_displaced, looks_losing, lost, companions, box_surfels,
-         most_surfels, most_free, icp_target] = object;
+         first_seen_ns, last_seen_ns, in_reach_ns, visit_ns, placed_ns, in_place_ns, last_robot,
+         seen_by, moment, observations, confirmed, added_ns, reported_box, changed, looks_missed,
+         looks_unobserved, unobserved_since_ns, looks_displaced, looks_losing, lost, companions,
+         box_surfels, most_surfels, most_free, icp_target] = object;
   a.version(1);
   a(class_id, stationarity_class, model, box, centroid_W, belief, arrival, moved);
   a(first_seen_ns, last_seen_ns, in_reach_ns, visit_ns, placed_ns, in_place_ns);

@@ -18,7 +18,9 @@ void LookedAt::note(const OrganizedCloud& cloud, StampNs stamp_ns) {
     if (kind == PixelKind::kNone || kind == PixelKind::kDynamic || kind == PixelKind::kIgnore) {
       continue;
     }
-    const auto axis = [&](float v) { return static_cast<std::int32_t>(std::floor(v * inverse_m_)); };
+    const auto axis = [&](float v) {
+      return static_cast<std::int32_t>(std::floor(v * inverse_m_));
+    };
     const BlockKey region{axis(cloud.x_W[i]), axis(cloud.y_W[i]), axis(cloud.z_W[i])};
     if (any && region == last) continue;  // as most neighbours are
     last = region;

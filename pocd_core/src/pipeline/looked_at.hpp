@@ -17,7 +17,8 @@ class LookedAt {
   /// `voxel_size_m`: of the map, > 0.
   explicit LookedAt(double voxel_size_m);
 
-  /// Every region in which the frame has measured a surface was looked at, by a sample of its pixels.
+  /// Every region in which the frame has measured a surface was looked at, by a sample of its
+  /// pixels.
   void note(const OrganizedCloud& cloud, StampNs stamp_ns);
 
   /// Regions that were looked at since the last call, ascending.

@@ -120,8 +120,8 @@ std::string reset(const ObjectTracker::Said& said, const WordParts& parts, Frame
 }  // namespace
 
 const char* to_string(WordKind kind) {
-  static const char* const names[kWordKinds] = {"forget_object", "forget_region",   "reset",
-                                                "ignore_region", "heed_region",     "confirm_removal",
+  static const char* const names[kWordKinds] = {"forget_object", "forget_region", "reset",
+                                                "ignore_region", "heed_region",   "confirm_removal",
                                                 "save"};
   return names[static_cast<int>(kind)];
 }

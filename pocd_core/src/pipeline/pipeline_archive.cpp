@@ -65,12 +65,12 @@ std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
   FreeSpace& space = ArchiveAccess::free_space(parts.tracker);
   for (const BlockKey& key : space.take_changed()) {
     const auto* block = ArchiveAccess::free_block(space, key);
-    add(PieceKind::kFreeSpace, piece_key(key), block ? archived(*block) : std::vector<std::uint8_t>{},
-        out);
+    add(PieceKind::kFreeSpace, piece_key(key),
+        block ? archived(*block) : std::vector<std::uint8_t>{}, out);
   }
   for (const BlockKey& key : parts.looked_at.take_changed()) {
-    add(PieceKind::kRegion, piece_key(key), archived(ArchiveAccess::looked_ns(parts.looked_at, key)),
-        out);
+    add(PieceKind::kRegion, piece_key(key),
+        archived(ArchiveAccess::looked_ns(parts.looked_at, key)), out);
   }
   return out;
 }

@@ -8,11 +8,11 @@
 #include <set>
 #include <string>
 
+#include "../track/object_tracker.hpp"
 #include "archive_access.hpp"
 #include "frame_clock.hpp"
 #include "ignored_regions.hpp"
 #include "looked_at.hpp"
-#include "../track/object_tracker.hpp"
 #include "operator_acts.hpp"
 #include "pipeline_archive.hpp"
 #include "pocd/common/check.hpp"
@@ -91,9 +91,11 @@ struct PocdPipeline::Impl {
   PipelineParts parts() {
     // All members: one that is added does not compile until it was decided whether it is kept.
     [[maybe_unused]] auto& [config_, classes_, pool_, frame_clock_, pose_gate_, ground_, tracker_,
-                            map_, robots_with_masks_, ignored_regions_, looked_at_, cloud_, planes_, observations_, field_,
-                            owner_of_pixel_, mask_missing_, archive_] = *this;
-    return {frame_clock_, pose_gate_, ground_, robots_with_masks_, ignored_regions_, looked_at_, tracker_};
+                            map_, robots_with_masks_, ignored_regions_, looked_at_, cloud_, planes_,
+                            observations_, field_, owner_of_pixel_, mask_missing_, archive_] =
+        *this;
+    return {frame_clock_,     pose_gate_, ground_, robots_with_masks_,
+            ignored_regions_, looked_at_, tracker_};
   }
 
   /// Whether a robot that delivers masks did not this time.
@@ -119,9 +121,9 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   const FrameClock::Verdict verdict = p.frame_clock.judge(frame.robot, frame.stamp_ns);
   if (verdict != FrameClock::Verdict::kGoesOn) {
     result.accepted = verdict == FrameClock::Verdict::kSetBack;
-    result.warnings.push_back(
-        off_text(frame, newest_ns) +
-        (result.accepted ? ": clocks were set back, goes on" : ": frame not used"));
+    result.warnings.push_back(off_text(frame, newest_ns) + (result.accepted
+                                                                ? ": clocks were set back, goes on"
+                                                                : ": frame not used"));
     if (!result.accepted) return result;
     p.tracker.set_clock_back(frame.stamp_ns);
   }

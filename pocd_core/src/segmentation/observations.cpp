@@ -61,7 +61,8 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
         if (!same && small.pixels * 4 > large.pixels) continue;
         // What has one instance number is one thing, whatever stands before it.
         const bool one_thing = same && large.instance != 0;
-        if (!one_thing && box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass))
+        if (!one_thing &&
+            box_overlap(large.box, small.box, min_size_m) < (same ? kSameClass : kOtherClass))
           continue;
         large.members.insert(large.members.end(), small.members.begin(), small.members.end());
         large.pixels += small.pixels;
@@ -209,8 +210,8 @@ void claim_foot(const OrganizedCloud& cloud, const SegmentationConfig& config,
   }
 }
 
-/// Of the observations that are things told by geometry: whether one is mostly one plane, as a piece
-/// of a wall is.
+/// Of the observations that are things told by geometry: whether one is mostly one plane, as a
+/// piece of a wall is.
 std::vector<bool> find_flat(const PlaneSegmentation& planes, const Observations& observations) {
   constexpr double kFlatShare = 0.5;
   std::vector<std::map<std::uint16_t, int>> counts(observations.list.size());
@@ -312,8 +313,8 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
   for (Cluster& cluster : clusters) {
     Observation observation;
     observation.class_id = cluster.class_id;
-    observation.instance = cluster.pieced ? static_cast<std::uint16_t>(out.list.size() + 1)
-                                          : cluster.instance;
+    observation.instance =
+        cluster.pieced ? static_cast<std::uint16_t>(out.list.size() + 1) : cluster.instance;
     observation.pixels = cluster.pixels;
     observation.area_m2 = cluster.area_m2;
     thin(cloud, planes, noise, spacing_m, cluster, memory, observation.points);

@@ -69,8 +69,7 @@ std::vector<Pose> likely_starts(const OrientedBox& known, const OrientedBox& fou
     const double turn_rad =
         quarter < 0 ? 0.0 : known.pose.yaw_rad - found.pose.yaw_rad + quarter * M_PI / 2.0;
     Pose start = Pose::Identity();
-    start.linear() =
-        Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    start.linear() = Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     // Sides of the found box, turned, along those of the known one.
     const double off_rad = found.pose.yaw_rad + turn_rad - known.pose.yaw_rad;
     const double c = std::abs(std::cos(off_rad)), s = std::abs(std::sin(off_rad));
@@ -100,8 +99,8 @@ bool ObjectTracker::may_tell(const Motion& motion, const Departure& departure,
                              const LibraryObject& found, StampNs now_ns) const {
   // What came from farther away is told once nearer origins had time to show.
   const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
-  return motion.lengths <= kAtOnceShare || (now_ns - departure.departed_ns >= wait_ns &&
-                                            now_ns - found.first_seen_ns >= wait_ns);
+  return motion.lengths <= kAtOnceShare ||
+         (now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns);
 }
 
 std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
@@ -308,14 +307,10 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   auto& retired = step.result.retired;
   retired.erase(std::remove(retired.begin(), retired.end(), from.id), retired.end());
   // Its other sides went with it, but for those whose place was seen empty.
-  std::vector<Surfel> sides;
-  const Eigen::Isometry3f T = T_new_old.cast<float>();
-  for (Surfel s : from.surfels) {
-    s.point_W = T * s.point_W;
-    s.normal_W = T.linear() * s.normal_W;
-    s.seen_through = 0;
-    if (!seen_empty(step.map, s.point_W)) sides.push_back(s);
-  }
+  std::vector<Surfel> sides = moved_surfels(from.surfels, T_new_old);
+  sides.erase(std::remove_if(sides.begin(), sides.end(),
+                             [&](const Surfel& s) { return seen_empty(step.map, s.point_W); }),
+              sides.end());
   hide_space_behind(step, found, 0);
   found.model.add(sides);
   found.icp_target.reset();

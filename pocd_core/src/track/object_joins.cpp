@@ -9,25 +9,11 @@ namespace {
 
 /// Two objects are seen in one piece when this many points of each are measured on it.
 constexpr int kSharedPoints = 10;
-/// Share of a found object that lies within another one's box when it is another side of it.
-constexpr double kInsideShare = 0.6;
-/// From this share on it is, whether it was found or arrived: no other thing stands within a thing.
+/// From this share within another one's box on, an object is a side of it, whether it was found or
+/// arrived: no other thing stands within a thing.
 constexpr double kWithinShare = 0.9;
 /// Two objects are one when this share of the smaller one lies on the other.
 constexpr double kSameShare = 0.5;
-/// A side that departed went along with a thing that moved: at the new place, at least this share of
-/// it is seen, or it was within the thing; at most this share of what is known there is empty.
-constexpr double kAlongSeenShare = 0.2;
-constexpr double kAlongEmptyShare = 0.15;
-/// Surfels of each object between which it is asked what was seen through.
-constexpr std::size_t kGapPoints = 150;
-/// Of the lines between facing surfaces of one body, at most this share crosses seen space or runs
-/// outside of it.
-constexpr double kGapShare = 0.2;
-/// A line runs outside of a body when it leaves its surface by more than this, as a cosine with the
-/// normal.
-constexpr float kOutside = 0.4f;
-
 }  // namespace
 
 bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) const {
@@ -69,86 +55,6 @@ bool ObjectTracker::coincide(const LibraryObject& a, const LibraryObject& b) con
   return static_cast<double>(same) >= kSameShare * static_cast<double>(asked);
 }
 
-bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a,
-                                 const LibraryObject& b) const {
-  const auto sample = [](const LibraryObject& object) {
-    std::vector<const Surfel*> some;
-    const auto& surfels = object.model.surfels();
-    const std::size_t step = std::max<std::size_t>(1, surfels.size() / kGapPoints);
-    for (std::size_t i = 0; i < surfels.size(); i += step) {
-      if (surfels[i].hits >= 2 && surfels[i].seen_through == 0) some.push_back(&surfels[i]);
-    }
-    return some;
-  };
-  const bool a_less = a.model.surfels().size() < b.model.surfels().size();
-  const auto from = sample(a_less ? a : b), to = sample(a_less ? b : a);
-  const auto reach_m = static_cast<float>(std::max(longest_side(a.box), longest_side(b.box)));
-  struct Line {
-    float length_m;
-    const Surfel *from, *to;
-  };
-  std::vector<Line> lines;
-  for (const Surfel* p : from) {
-    Line best{std::numeric_limits<float>::infinity(), p, p};
-    for (const Surfel* q : to) {
-      const float length_m = (q->point_W - p->point_W).norm();
-      if (length_m < best.length_m) best.length_m = length_m, best.to = q;
-    }
-    lines.push_back(best);
-  }
-  if (lines.empty()) return false;
-  // The half that faces the other one.
-  std::sort(lines.begin(), lines.end(),
-            [](const Line& l, const Line& r) { return l.length_m < r.length_m; });
-  lines.resize((lines.size() + 1) / 2);
-  if (lines.front().length_m > reach_m) return false;
-  const auto cell_m = static_cast<float>(2.0 * config_.map.voxel_size_m);
-  std::size_t crossing = 0;
-  for (const Line& line : lines) {
-    const Eigen::Vector3f along = (line.to->point_W - line.from->point_W) / line.length_m;
-    bool open = line.length_m > reach_m || line.from->normal_W.dot(along) > kOutside ||
-                line.to->normal_W.dot(along) < -kOutside;
-    for (float at = cell_m; !open && at < line.length_m - 0.5f * cell_m; at += 0.5f * cell_m)
-      open = seen_empty(step.map, line.from->point_W + at * along);
-    crossing += open;
-  }
-  return static_cast<double>(crossing) <= kGapShare * static_cast<double>(lines.size());
-}
-
-void ObjectTracker::join_sides(Step& step) {
-  const auto gap_ns = static_cast<StampNs>(config_.state.visit_gap_s * 1e9);
-  const ViewBall view = view_ball(step.cloud, config_.map.max_depth_m);
-  std::vector<ObjectId> visited;
-  for (const ObjectId id : library_.near(view.center_W, view.radius_m)) {
-    LibraryObject* object = library_.find(id);
-    const bool anew = step.frame.stamp_ns - object->in_reach_ns > gap_ns;
-    object->in_reach_ns = step.frame.stamp_ns;
-    if (!anew) continue;
-    object->visit_ns = step.frame.stamp_ns;
-    if (object->confirmed) visited.push_back(id);
-  }
-  for (const ObjectId id : visited) {
-    for (bool joined = true; joined;) {
-      joined = false;
-      LibraryObject* object = library_.find(id);
-      if (!object) break;
-      for (const ObjectId other_id :
-           library_.near(object->box.pose.position_W, object->box.size_m.norm())) {
-        LibraryObject* other = library_.find(other_id);
-        if (other_id == id || !other->confirmed || other->class_id != object->class_id ||
-            object->looks_unobserved > 0 || other->looks_unobserved > 0 ||
-            !may_be_one(*object, *other) || !sides_of_one(step, *object, *other)) {
-          continue;
-        }
-        const bool older = object->id < other->id;
-        absorb(step, older ? *object : *other, older ? *other : *object);
-        joined = true;
-        break;
-      }
-    }
-  }
-}
-
 void ObjectTracker::join_objects(Step& step) {
   const int enough = config_.state.merge_frames;
   std::vector<std::pair<ObjectId, ObjectId>> joined;
@@ -173,12 +79,17 @@ void ObjectTracker::join_objects(Step& step) {
                    step.observations.list[u.observation].instance != 0;
         }
       }
+      if (apart) {
+        x.companions[y.id] = LibraryObject::kToldApart;
+        continue;
+      }
       const auto count = x.companions.find(y.id);
-      if (!one_piece || apart) {
+      if (!one_piece) {
         // Once seen as two, they have to be seen as one for as long again.
         const bool both =
             look_a.sighting.hit >= kSharedPoints && look_b.sighting.hit >= kSharedPoints;
-        if (both && count != x.companions.end() && --count->second <= 0) x.companions.erase(count);
+        if (both && count != x.companions.end() && count->second > 0 && --count->second == 0)
+          x.companions.erase(count);
         continue;
       }
       if (coincide(x, y)) {
@@ -186,7 +97,8 @@ void ObjectTracker::join_objects(Step& step) {
         continue;
       }
       int& looks = x.companions[y.id];
-      if (++looks < enough) continue;
+      looks = std::max(looks, 0) + 1;
+      if (looks < enough) continue;
       looks = 0;
       if (connected(x, y)) joined.emplace_back(x.id, y.id);
     }
@@ -229,107 +141,6 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   survivor.reported_box = survivor.box;
 }
 
-ObjectTracker::Along ObjectTracker::went_along(Step& step, const Departure& departure,
-                                               const Move& move) {
-  LibraryObject* moved = library_.find(move.id);
-  if (!moved || departure.class_id != move.class_id || departure.id == move.id ||
-      departure.part_of == move.id || departure.in_place_ns > move.moved_ns) {
-    return Along::kNo;
-  }
-  // What arrived after it left is another thing.
-  if (departure.arrival == Arrival::kArrived && departure.first_seen_ns > move.in_place_ns)
-    return Along::kNo;
-  const double reach_m = longest_side(move.from);
-  const double apart_m =
-      (departure.box.pose.position_W - move.from.pose.position_W).head<2>().norm();
-  if (apart_m > 0.5 * longest_side(departure.box) + 1.5 * reach_m) return Along::kNo;
-  std::vector<LibraryObject*> arrivals;
-  for (const ObjectId id : library_.near(moved->box.pose.position_W, reach_m + apart_m)) {
-    LibraryObject* other = library_.find(id);
-    if (id != move.id && other->class_id == move.class_id && other->added_ns &&
-        other->first_seen_ns > std::max(move.in_place_ns, departure.in_place_ns)) {
-      arrivals.push_back(other);
-    }
-  }
-  const Eigen::Isometry3f T = move.T_new_old.cast<float>();
-  const auto radius = static_cast<float>(config_.map.voxel_size_m);
-  const double margin_m = 2.0 * config_.map.voxel_size_m;
-  std::vector<Surfel> sides;
-  std::vector<int> on_arrival(arrivals.size(), 0);
-  int on_moved = 0, seen = 0, empty = 0, inside = 0;
-  for (Surfel s : departure.surfels) {
-    inside += is_inside(move.from, margin_m, s.point_W);
-    s.point_W = T * s.point_W;
-    s.normal_W = T.linear() * s.normal_W;
-    s.seen_through = 0;
-    const bool met = moved->model.nearest(s.point_W, radius) != ObjectModel::kNone;
-    bool measured = met;
-    on_moved += met;
-    for (std::size_t k = 0; k < arrivals.size(); ++k) {
-      if (arrivals[k]->model.nearest(s.point_W, radius) == ObjectModel::kNone) continue;
-      ++on_arrival[k];
-      measured = true;
-    }
-    seen += measured;
-    if (!measured && seen_empty(step.map, s.point_W)) {
-      ++empty;
-      continue;
-    }
-    sides.push_back(s);
-  }
-  const auto all = static_cast<double>(departure.surfels.size());
-  if (empty > kAlongEmptyShare * (seen + empty)) return Along::kNo;
-  if (on_moved >= kAlongSeenShare * all || inside >= kInsideShare * all) {
-    moved->model.add(sides);
-    moved->icp_target.reset();
-    moved->most_surfels = std::max(moved->most_surfels, moved->model.surfels().size());
-    refit_box(step, *moved);
-    mark_changed(*moved);
-    ObjectEvent& event = add_event(step, EventKind::kUpdated, *moved,
-                                   "joined_" + std::to_string(to_index(departure.id)));
-    if (departure.part_of == ObjectId::kNone) event.absorbed = departure.id;
-    moved->reported_box = moved->box;
-    return Along::kJoined;
-  }
-  const auto most = std::max_element(on_arrival.begin(), on_arrival.end());
-  if (most == on_arrival.end() || *most < kAlongSeenShare * all) return Along::kNo;
-  report_move(step, *arrivals[most - on_arrival.begin()], departure, move.T_new_old,
-              "moved_alike");
-  return Along::kMoved;
-}
-
-void ObjectTracker::gather_sides(Step& step, Move move) {
-  if (!library_.find(move.id)) return;
-  std::vector<Departure> departures;
-  for (const Departure& d :
-       departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
-    departures.push_back(d);
-  }
-  for (const Departure& d : departures) {
-    // A move of another side may have told what became of it.
-    if (!departures_.has(d.id)) continue;
-    if (went_along(step, d, move) == Along::kJoined) departures_.forget(d.id);
-  }
-  // What was seen there first since it moved, and lies within it, is of it.
-  const LibraryObject* moved = library_.find(move.id);
-  const double margin_m = 2.0 * config_.map.voxel_size_m;
-  for (const ObjectId id :
-       library_.near(moved->box.pose.position_W, 0.5 * moved->box.size_m.norm())) {
-    LibraryObject* other = library_.find(id);
-    if (id == move.id || other->class_id != move.class_id || !other->added_ns ||
-        other->first_seen_ns <= move.in_place_ns) {
-      continue;
-    }
-    std::size_t inside = 0;
-    for (const Surfel& s : other->model.surfels())
-      inside += is_inside(moved->box, margin_m, s.point_W);
-    if (static_cast<double>(inside) >=
-        kInsideShare * static_cast<double>(other->model.surfels().size())) {
-      absorb(step, *library_.find(move.id), *other);
-    }
-  }
-}
-
 bool ObjectTracker::seen_apart(const Step& step, ObjectId a, ObjectId b) const {
   const auto instance_of = [&](std::size_t p) {
     return step.observations.list[step.parts[p].observation].instance;
@@ -344,14 +155,6 @@ bool ObjectTracker::seen_apart(const Step& step, ObjectId a, ObjectId b) const {
   return false;
 }
 
-bool ObjectTracker::surroundings_known(const LibraryObject& found,
-                                       const LibraryObject& known) const {
-  // A thing that arrived may stand beside another that arrived in the same visit.
-  if (found.arrival == Arrival::kArrived) return known.visit_ns > known.placed_ns;
-  const auto gap_ns = static_cast<StampNs>(config_.state.visit_gap_s * 1e9);
-  return found.first_seen_ns - known.placed_ns > gap_ns;
-}
-
 LibraryObject* ObjectTracker::whole_of(Step& step, const LibraryObject& found) {
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   const bool arrived = found.arrival == Arrival::kArrived;
@@ -363,11 +166,7 @@ LibraryObject* ObjectTracker::whole_of(Step& step, const LibraryObject& found) {
       continue;
     }
     if (coincide(found, *other)) return other;
-    std::size_t inside = 0;
-    for (const Surfel& s : found.model.surfels())
-      inside += is_inside(other->box, margin_m, s.point_W);
-    const double share =
-        static_cast<double>(inside) / static_cast<double>(found.model.surfels().size());
+    const double share = inside_share(found.model.surfels(), other->box, margin_m);
     if (share >= kWithinShare) return other;
     // What arrived is a side of what arrived lately; what was found, of what stands longer, too.
     const bool other_arrived = other->arrival == Arrival::kArrived;

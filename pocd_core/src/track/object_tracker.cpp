@@ -25,53 +25,6 @@ constexpr double kViewCells = 100.0;
 /// So far in front of a surface a voxel was seen empty.
 constexpr double kClearVoxels = 1.5;
 
-/// Paints the owners of the parts into the grid. Pixels of an observation with one owner are its;
-/// else a pixel belongs to the owner of the point in its cell.
-void paint(const Observations& observations, const std::vector<Part>& parts,
-           const std::vector<ObjectId>& owners, const OrganizedCloud& cloud, double spacing_m,
-           std::vector<std::uint32_t>& owner_of_pixel) {
-  struct Owners {
-    std::vector<std::size_t> parts;
-    std::uint32_t main = 0;
-    bool one = true;
-    CellIndex cells;
-  };
-  std::vector<Owners> all(observations.list.size());
-  for (std::size_t p = 0; p < parts.size(); ++p) all[parts[p].observation].parts.push_back(p);
-  const float inverse = static_cast<float>(1.0 / spacing_m);
-  for (std::size_t j = 0; j < all.size(); ++j) {
-    Owners& o = all[j];
-    std::size_t most = 0, points = 0;
-    for (const std::size_t p : o.parts) {
-      points += parts[p].points.size();
-      if (parts[p].points.size() > most)
-        most = parts[p].points.size(), o.main = to_index(owners[p]);
-    }
-    o.one = points == observations.list[j].points.size() &&
-            std::all_of(o.parts.begin(), o.parts.end(),
-                        [&](std::size_t p) { return to_index(owners[p]) == o.main; });
-    if (o.one) continue;
-    for (const std::size_t p : o.parts) {
-      for (const SurfacePoint& point : parts[p].points) {
-        o.cells.insert(cell_key(point.point_W, inverse),
-                       static_cast<std::int32_t>(to_index(owners[p])));
-      }
-    }
-  }
-  owner_of_pixel.assign(cloud.size(), 0);
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const std::int32_t j = observations.observation_of[i];
-    if (j == Observations::kNone) continue;
-    const Owners& o = all[j];
-    if (o.one) {
-      owner_of_pixel[i] = o.main;
-      continue;
-    }
-    const std::int32_t owner = o.cells.find(cell_key(cloud.point_W(i), inverse));
-    owner_of_pixel[i] = owner == CellIndex::kNone ? 0 : static_cast<std::uint32_t>(owner);
-  }
-}
-
 }  // namespace
 
 ObjectTracker::ObjectTracker(const PipelineConfig& config)
@@ -94,7 +47,8 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
   remove_objects(step);
   confirm_objects(step);
   report_changes(step);
-  paint(observations, step.parts, step.owners, cloud, config_.map.voxel_size_m, owner_of_pixel);
+  paint_owners(observations, step.parts, step.owners, cloud, config_.map.voxel_size_m,
+               owner_of_pixel);
   free_space_.update(cloud, field, config_.depth_noise, config_.map.max_depth_m,
                      config_.change.pose_tolerance_m);
 }
@@ -177,7 +131,7 @@ void ObjectTracker::update_beliefs(Step& step) {
 void ObjectTracker::move_displaced(Step& step, Look& look) {
   LibraryObject& object = *look.object;
   const OrientedBox previous_box = object.box;
-  const Move move{object.id,          object.class_id,    previous_box,
+  const Move move{object.id,      object.class_id,    previous_box,
                   look.T_new_old, object.in_place_ns, step.frame.stamp_ns};
   object.looks_displaced = 0;
   object.model.transform(look.T_new_old);
@@ -261,8 +215,8 @@ void ObjectTracker::fuse_parts(Step& step) {
     if (!object) object = &create(step, step.observations.list[part.observation].class_id);
     // On a contested surface what was measured may be another place of it.
     if (!part.look || !part.look->contested) fuse(step, *object, part.points);
-    object->most_free = std::max(object->most_free,
-                                 step.observations.list[part.observation].free_beside_share);
+    object->most_free =
+        std::max(object->most_free, step.observations.list[part.observation].free_beside_share);
     step.owners[p] = object->id;
     if (std::find(seen.begin(), seen.end(), object) == seen.end()) seen.push_back(object);
   }

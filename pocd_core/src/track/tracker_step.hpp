@@ -26,4 +26,13 @@ struct ObjectTracker::Step {
   std::map<ObjectId, Evidence> evidence;
 };
 
+/// Share of a found object that lies within another one's box when it is another side of it.
+inline constexpr double kInsideShare = 0.6;
+
+/// The surfels after a motion [m, W]; none of them has been seen through there.
+std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose& T_new_old);
+
+/// Share of the surfels that lie in the box, grown by `margin_m` on all sides.
+double inside_share(const std::vector<Surfel>& surfels, const OrientedBox& box, double margin_m);
+
 }  // namespace pocd

@@ -1,9 +1,9 @@
 // Identifiers, stamps and labels: strong where mixing them up would compile.
 #pragma once
 
-#include <cmath>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>

@@ -34,9 +34,10 @@ struct RosOutputConfig {
     visit("markers_hz", markers_hz, Range{0.0, 20.0}, "rt/pocd/objects/markers; 0: off [1/s].");
     visit("occupancy_hz", occupancy_hz, Range{0.0, 20.0},
           "rt/pocd/map and rt/pocd/map_updates, when the map has changed; 0: off [1/s].");
-    visit("occupancy_whole_s", occupancy_whole_s, Range{0.5, 3600.0},
-          "After updates, the whole grid comes again when the last one is so old: receivers may have "
-          "missed an update [s].");
+    visit(
+        "occupancy_whole_s", occupancy_whole_s, Range{0.5, 3600.0},
+        "After updates, the whole grid comes again when the last one is so old: receivers may have "
+        "missed an update [s].");
     visit("surface_hz", surface_hz, Range{0.0, 20.0},
           "rt/pocd/surface, while it has subscribers and when the map has changed; 0: off [1/s].");
     visit("obstacles_hz", obstacles_hz, Range{0.0, 20.0}, "rt/rmf_obstacles; 0: off [1/s].");

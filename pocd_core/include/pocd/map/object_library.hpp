@@ -63,17 +63,19 @@ struct LibraryObject {
   std::uint32_t observations = 0;
 
   // Where it is in its life.
-  bool confirmed = false;              ///< false: tentative, known to nobody outside
-  std::optional<StampNs> added_ns;     ///< when it was reported as ADDED; unset once it was moved
-  OrientedBox reported_box;            ///< as in the last event
-  bool changed = false;                ///< since the last FrameResult
-  int looks_missed = 0;                ///< tentative only: in view without being fused
-  int looks_unobserved = 0;            ///< in a row: its place was seen empty
-  StampNs unobserved_since_ns = 0;     ///< the first of them
-  int looks_displaced = 0;             ///< in a row: aligned beside its place
-  int looks_losing = 0;                ///< in a row: a part of it is seen through
-  std::size_t lost = 0;                ///< points eroded since the last event
-  std::map<ObjectId, int> companions;  ///< objects seen in one piece with it: in how many looks
+  bool confirmed = false;           ///< false: tentative, known to nobody outside
+  std::optional<StampNs> added_ns;  ///< when it was reported as ADDED; unset once it was moved
+  OrientedBox reported_box;         ///< as in the last event
+  bool changed = false;             ///< since the last FrameResult
+  int looks_missed = 0;             ///< tentative only: in view without being fused
+  int looks_unobserved = 0;         ///< in a row: its place was seen empty
+  StampNs unobserved_since_ns = 0;  ///< the first of them
+  int looks_displaced = 0;          ///< in a row: aligned beside its place
+  int looks_losing = 0;             ///< in a row: a part of it is seen through
+  std::size_t lost = 0;             ///< points eroded since the last event
+  /// Objects seen in one piece with it: in how many looks, or kToldApart.
+  std::map<ObjectId, int> companions;
+  static constexpr int kToldApart = -1;  ///< masks showed them as two things
 
   std::size_t box_surfels = 0;  ///< size of the model when the box was fitted
   std::size_t most_surfels = 0;

@@ -51,6 +51,11 @@ class FreeSpace {
   static constexpr int kSide = 8;
   static constexpr int kCells = kSide * kSide * kSide;
   using Block = std::array<std::uint8_t, kCells>;
+  struct Place {
+    BlockKey block;
+    int cell = 0;  ///< number within the block
+  };
+  Place place_of(const Eigen::Vector3f& point_W) const;
 
   double cell_m_;
   std::unordered_map<BlockKey, std::unique_ptr<Block>, BlockKeyHash> blocks_;  ///< looked up only

@@ -37,4 +37,11 @@ struct PartsConfig {
 std::vector<Part> divide(const Observations& observations, Look* looks, std::size_t count,
                          const SeenEmpty& seen_empty, const PartsConfig& config);
 
+/// Paints the owners of the parts (one per part) into the grid: `owner_of_pixel` gets, per pixel of
+/// an observation, the object that owns the surface there, else 0. Pixels of an observation with
+/// one owner are its; else a pixel belongs to the owner of the point in its cell of `spacing_m`.
+void paint_owners(const Observations& observations, const std::vector<Part>& parts,
+                  const std::vector<ObjectId>& owners, const OrganizedCloud& cloud,
+                  double spacing_m, std::vector<std::uint32_t>& owner_of_pixel);
+
 }  // namespace pocd

@@ -11,12 +11,12 @@ namespace pocd {
 
 enum class WordKind : std::uint8_t {
   kForgetObject = 0,  ///< nothing is known of it any more; it is ADDED anew when it is seen
-  kForgetRegion,      ///< the same for all objects with their middle in the polygon, and the map there
-  kReset,             ///< the same for everything; ignored regions and numbers stay
-  kIgnoreRegion,      ///< what is seen in or through the polygon is not used, until heeded again
-  kHeedRegion,        ///< ends kIgnoreRegion
-  kConfirmRemoval,    ///< the object is REMOVED: a person has seen that it is gone
-  kSave               ///< nothing changes; for a memory, which writes at once
+  kForgetRegion,  ///< the same for all objects with their middle in the polygon, and the map there
+  kReset,         ///< the same for everything; ignored regions and numbers stay
+  kIgnoreRegion,  ///< what is seen in or through the polygon is not used, until heeded again
+  kHeedRegion,    ///< ends kIgnoreRegion
+  kConfirmRemoval,  ///< the object is REMOVED: a person has seen that it is gone
+  kSave             ///< nothing changes; for a memory, which writes at once
 };
 constexpr int kWordKinds = 7;
 const char* to_string(WordKind kind);  ///< "forget_object", ... as the rule of events

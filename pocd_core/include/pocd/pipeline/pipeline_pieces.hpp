@@ -9,8 +9,8 @@
 namespace pocd {
 
 enum class PieceKind : std::uint8_t {
-  kPart = 0,    ///< clocks, gates, ground, counters; the key says which
-  kObject = 1,  ///< one object, tentative ones too; the key is its id
+  kPart = 0,       ///< clocks, gates, ground, counters; the key says which
+  kObject = 1,     ///< one object, tentative ones too; the key is its id
   kFreeSpace = 2,  ///< a block of cells that were seen empty; the key is the block's
   kRegion = 3      ///< when a region of the map was last looked at; the key is the region's
 };

@@ -23,9 +23,9 @@ class PocdPipeline {
   /// Frames of one or several robots, in the order they are to be fused. Throws InputError, and
   /// changes nothing, for a frame that make_frame would not have made, that is smaller than the
   /// stride, or whose view holds too many voxels. Anything merely implausible is a warning in the
-  /// result: a pose that jumps, a stamp that lies more than 10 s off those of other robots. When more
-  /// of the robots heard lately have a stamp there than not, time went on or, after ten such frames,
-  /// the clocks were set back: what is known is known from before.
+  /// result: a pose that jumps, a stamp that lies more than 10 s off those of other robots. When
+  /// more of the robots heard lately have a stamp there than not, time went on or, after ten such
+  /// frames, the clocks were set back: what is known is known from before.
   FrameResult process_frame(const Frame& frame);
 
   /// Confirmed objects by id.

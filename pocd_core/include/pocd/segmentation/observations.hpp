@@ -28,11 +28,12 @@ struct Observation {
   /// Share of its outline (sides and top) where the image, the depth limit or something nearer cuts
   /// it off: above about 0.1 it goes on unseen.
   double cut_share = 0.0;
-  /// The same of the upper outline alone, without the depth limit: above a fifth or so, its height is
-  /// not known.
+  /// The same of the upper outline alone, without the depth limit: above a fifth or so, its height
+  /// is not known.
   double cut_above_share = 0.0;
-  /// Of a thing told by geometry: share of its left and right outline where nothing cuts it off and
-  /// it does not go on in its plane. 0: it may be a piece of a wall.
+  /// Of a thing told by geometry: share of its left and right outline where it ends: what lies
+  /// behind is seen, and is not its own plane going on. Where something nearer hides the end, it
+  /// counts as one, but not of what is mostly one plane. 0: it may be a piece of a wall.
   double free_beside_share = 1.0;
 };
 

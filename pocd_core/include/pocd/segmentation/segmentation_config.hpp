@@ -5,8 +5,9 @@
 
 namespace pocd {
 
-/// Of a robot that sends no masks: what makes one thing of pieces, and a thing of a piece. Shares, so
-/// that they hold at any scale and distance; lengths are those of the segmentation and of the noise.
+/// Of a robot that sends no masks: what makes one thing of pieces, and a thing of a piece. Shares,
+/// so that they hold at any scale and distance; lengths are those of the segmentation and of the
+/// noise.
 struct ThingsConfig {
   double behind_share = 0.25;
   double rim_share = 0.6;
@@ -14,14 +15,16 @@ struct ThingsConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("behind_share", behind_share, Range{0.05, 1.0},
-          "Two pieces are one thing when, along this share of the smaller one's height or width, the "
-          "plane of each goes on in the other behind something nearer. A quarter: small pieces have "
-          "few pixels whose plane is known.");
-    visit("rim_share", rim_share, Range{0.05, 1.0},
-          "Two pieces are one open container when one is seen over the upper edge of the other along "
-          "this share of the wider one. More than half: a thing behind another one seldom has its "
-          "width and its height.");
+    visit(
+        "behind_share", behind_share, Range{0.05, 1.0},
+        "Two pieces are one thing when, along this share of the smaller one's height or width, the "
+        "plane of each goes on in the other behind something nearer. A quarter: small pieces have "
+        "few pixels whose plane is known.");
+    visit(
+        "rim_share", rim_share, Range{0.05, 1.0},
+        "Two pieces are one open container when one is seen over the upper edge of the other along "
+        "this share of the wider one. More than half: a thing behind another one seldom has its "
+        "width and its height.");
     visit("side_share", side_share, Range{0.0, 1.0},
           "A thing is reported once this share of its left and right outline was seen to be its "
           "end, in one look; a piece of a wall has none. Not 0: outlines are ragged.");

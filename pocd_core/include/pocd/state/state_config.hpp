@@ -56,9 +56,10 @@ struct StateConfig {
           "one MOVED then [frames].");
     visit("merge_frames", merge_frames, Range{1, 100000},
           "Objects of one class that share an observation in this many frames are one [frames].");
-    visit("visit_gap_s", visit_gap_s, Range{0.0, 1e6},
-          "When nobody was near an object for this time, the next look is a new visit: what was seen "
-          "of the space between it and its neighbours is complete, and its sides are joined [s].");
+    visit(
+        "visit_gap_s", visit_gap_s, Range{0.0, 1e6},
+        "When nobody was near an object for this time, the next look is a new visit: what was seen "
+        "of the space between it and its neighbours is complete, and its sides are joined [s].");
     visit(
         "moment_s", moment_s, Range{0.0, 10.0},
         "Looks of several robots at one object within this time are one measurement: the one that "

@@ -16,7 +16,7 @@ struct Departure {
   OrientedBox box;
   std::vector<Surfel> surfels;
   StampNs first_seen_ns = 0;
-  StampNs in_place_ns = 0;  ///< last seen in its place
+  StampNs in_place_ns = 0;    ///< last seen in its place
   StampNs first_gone_ns = 0;  ///< first of the looks in a row that found it gone; 0: not known
   StampNs departed_ns = 0;    ///< found gone
   Arrival arrival = Arrival::kUnknown;
@@ -31,15 +31,18 @@ struct Motion {
   double fit = 0.0;      ///< of what is known at the new place, the share that agrees
   double seen = 0.0;     ///< share of the old surface that is seen at the new place
   double lengths = 0.0;  ///< of its way (mean over its points), in its own lengths
-  /// Of motions that explain the same, the shortest is the likeliest: the sides of a box are alike.
-  double likelihood() const { return fit + seen - 0.4 * lengths; }
+  /// Share of the surface that a motion must explain more when it is longer by the thing's length.
+  static constexpr double kShortness = 0.4;
+  /// Orders motions. Of those that explain the same, the shortest comes first: the sides of a box
+  /// are alike.
+  double likelihood() const { return fit + seen - kShortness * lengths; }
 };
 
 /// A thing that was found at a new place.
 struct Move {
   ObjectId id = ObjectId::kNone;
   ClassId class_id = 0;
-  OrientedBox from;             ///< where all that is known of it was
+  OrientedBox from;  ///< where all that is known of it was
   Pose T_new_old = Pose::Identity();
   StampNs in_place_ns = 0;  ///< last seen at its old place
   StampNs moved_ns = 0;     ///< found at the new one
