@@ -1,6 +1,7 @@
 // A robot with a small camera, played by the test itself.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
@@ -112,20 +113,25 @@ class FrameWatch {
   /// participant announces its readers in the order of their making: a node whose health has come
   /// in by a reader that was made later has found this one, too.
   bool matched() { return reader_.matched() > 0 && behind_.newest() != nullptr; }
-  int processed(const std::string& robot) {
+  /// Those with this stamp or a later one.
+  int processed(const std::string& robot, StampNs from_ns = 0) {
     pocd_msgs::msg::FrameRecord record;
     dds::SampleMeta meta;
     while (reader_.take(record, meta)) {
-      if (meta.valid && record.outcome() == 0) ++processed_[record.robot()];
+      if (meta.valid && record.outcome() == 0) {
+        processed_[record.robot()].push_back(dds::to_stamp(record.stamp()));
+      }
     }
-    return processed_[robot];
+    const std::vector<StampNs>& stamps = processed_[robot];
+    return static_cast<int>(std::count_if(stamps.begin(), stamps.end(),
+                                          [&](StampNs stamp_ns) { return stamp_ns >= from_ns; }));
   }
 
  private:
   dds::Wakeup wakeup_;
   dds::Reader<pocd_msgs::msg::FrameRecordPubSubType> reader_;
   HealthWatch behind_;  // made after the reader
-  std::map<std::string, int> processed_;
+  std::map<std::string, std::vector<StampNs>> processed_;
 };
 
 /// pocd_node that listens to whoever appears.
