@@ -202,7 +202,10 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
     // both, however thick the thing is behind its known side.
     const bool covers = before.through < kLeastPoints;
     const double side_m = std::min(longest_side(object.box), object.box.size_m.z());
-    if (covers && match->displacement_m > kTakenShare * side_m) continue;
+    if (covers &&
+        (before.covered <= kMajority * told || match->displacement_m > kTakenShare * side_m)) {
+      continue;
+    }
     std::vector<Surfel> moved = object.model.surfels();
     const Eigen::Isometry3f T = match->T_new_old.cast<float>();
     for (Surfel& s : moved) {

@@ -9,20 +9,27 @@
 namespace pocd {
 namespace {
 
-/// At most this share of the new surface lies beside the old one, moved there.
-constexpr double kOutlierShare = 0.2;
-/// When at least this share of the old surface is seen at the new place, more of the new one may
-/// lie beside it, up to kUnseenShare: sides that were not known.
-constexpr double kWholeShare = 0.6;
+/// At most this share of the new surface lies off the old one, moved there: on sides that were not
+/// known.
 constexpr double kUnseenShare = 0.5;
-/// Of what is known of the old surface at the new place, at most this share lies where nothing is.
-constexpr double kEmptyShare = 0.15;
+/// At most this share of it lies even outside of the old one's box, unless at least kWholeShare of
+/// the old surface is seen at the new place: the box was that of a part.
+constexpr double kBesideShare = 0.2;
+constexpr double kWholeShare = 0.6;
+/// Of what is known of the old surface at the new place, at most this share lies where nothing is:
+/// some of it may have been seen empty before the thing came.
+constexpr double kEmptyShare = 0.25;
 /// At least this share of the old surface, moved, is seen at the new place.
 constexpr double kSeenShare = 0.2;
-/// A thing in a place that was never seen empty moved no farther than this, in its lengths.
+/// A thing in a place that was not seen empty before moved no farther than this, in its lengths,
+/// unless it is whole and fits surely. When less than kWholeShare of it is seen, it fits surely and
+/// has turned by less than kShiftRad: else it may be what the old one hid.
 constexpr double kNearShare = 1.0;
-/// So far, in its lengths, a move is told at once.
+constexpr double kSureFit = 0.9;
+constexpr double kShiftRad = M_PI / 4.0;
+/// So far, in its lengths or in shares of the reach, a move is told at once.
 constexpr double kAtOnceShare = 1.0;
+constexpr double kAtOnceReachShare = 1.0 / 3.0;
 /// A longer one is told after this time: another origin may be nearer [s].
 constexpr double kFarWaitS = 1.0;
 /// Motions that agree with this much less of what is known explain it as well; when they put the
@@ -99,8 +106,61 @@ bool ObjectTracker::may_tell(const Motion& motion, const Departure& departure,
                              const LibraryObject& found, StampNs now_ns) const {
   // What came from farther away is told once nearer origins had time to show.
   const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  const double moved_m = motion.lengths * longest_side(departure.box);
   return motion.lengths <= kAtOnceShare ||
+         moved_m <= kAtOnceReachShare * config_.state.relocation_reach_m ||
          (now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns);
+}
+
+std::optional<Motion> ObjectTracker::explanation(const Departure& departure,
+                                                 const LibraryObject& found,
+                                                 const IcpTarget& target, const Points& source,
+                                                 const IcpResult& icp) const {
+  const auto all = static_cast<double>(departure.surfels.size());
+  const double inlier_m = 1.5 * config_.map.voxel_size_m;
+  Motion motion;
+  motion.T_new_old = icp.T_target_source.inverse();
+  double moved_m = 0.0;  // of its points: what turns in place moves, too
+  for (const Surfel& s : departure.surfels) {
+    const Eigen::Vector3d p = s.point_W.cast<double>();
+    moved_m += (motion.T_new_old * p - p).norm();
+  }
+  moved_m /= all;
+  if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
+    return std::nullopt;
+  motion.lengths = moved_m / longest_side(departure.box);
+  // What of the old surface is at the new place, and what is not.
+  const Eigen::Isometry3f T = motion.T_new_old.cast<float>();
+  std::size_t empty = 0, seen = 0;
+  for (const Surfel& s : departure.surfels) {
+    const Eigen::Vector3f there = T * s.point_W;
+    if (found.model.nearest(there, static_cast<float>(inlier_m)) != ObjectModel::kNone) {
+      ++seen;
+    } else if (free_space_.seen_empty(there)) {
+      ++empty;
+    }
+  }
+  motion.seen = static_cast<double>(seen) / all;
+  const double contradicted =
+      static_cast<double>(empty) / std::max(1.0, static_cast<double>(seen + empty));
+  if (contradicted > kEmptyShare) return std::nullopt;
+  motion.fit = 1.0 - icp.dissimilarity - contradicted;
+  // What of the new surface the old place has no room for.
+  std::size_t beside = 0;
+  for (const auto& p : source) {
+    const Eigen::Vector3d there = icp.T_target_source * p.cast<double>();
+    beside += !is_inside(departure.box, inlier_m, there.cast<float>()) &&
+              !target.nearest((there - target.origin_W()).cast<float>());
+  }
+  if (static_cast<double>(beside) > kBesideShare * static_cast<double>(source.size()) &&
+      motion.seen < kWholeShare) {
+    return std::nullopt;
+  }
+  const bool surely_whole =
+      found.arrival == Arrival::kUnknown && motion.seen >= kWholeShare && motion.fit >= kSureFit;
+  if (motion.lengths > kNearShare && found.arrival != Arrival::kArrived && !surely_whole)
+    return std::nullopt;
+  return motion;
 }
 
 std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
@@ -129,39 +189,11 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   options.robust_scale_m = config_.map.voxel_size_m;
   const std::vector<Pose> starts = likely_starts(departure.box, found.box, target, source);
   std::vector<Motion> explanations;
-  const auto all = static_cast<double>(departure.surfels.size());
   for (const Pose& start : starts) {
     const IcpResult icp = point_to_plane_icp(target, source, options, start);
     if (icp.dissimilarity > kUnseenShare) continue;
-    const Pose T_new_old = icp.T_target_source.inverse();
-    double moved_m = 0.0;  // of its points: what turns in place moves, too
-    for (const Surfel& s : departure.surfels) {
-      const Eigen::Vector3d p = s.point_W.cast<double>();
-      moved_m += (T_new_old * p - p).norm();
-    }
-    moved_m /= all;
-    if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
-      continue;
-    const double lengths = moved_m / longest_side(departure.box);
-    if (lengths > kNearShare && found.arrival != Arrival::kArrived) continue;
-    const Eigen::Isometry3f T = T_new_old.cast<float>();
-    std::size_t empty = 0, seen = 0;
-    for (const Surfel& s : departure.surfels) {
-      const Eigen::Vector3f there = T * s.point_W;
-      if (found.model.nearest(there, static_cast<float>(inlier_m)) != ObjectModel::kNone) {
-        ++seen;
-      } else if (free_space_.seen_empty(there)) {
-        ++empty;
-      }
-    }
-    const double contradicted =
-        static_cast<double>(empty) / std::max(1.0, static_cast<double>(seen + empty));
-    if (contradicted > kEmptyShare) continue;
-    // New sides may show when all of the known ones do.
-    const double seen_share = static_cast<double>(seen) / all;
-    if (icp.dissimilarity > kOutlierShare && seen_share < kWholeShare) continue;
-    explanations.push_back(
-        {T_new_old, 1.0 - icp.dissimilarity - contradicted, seen_share, lengths});
+    if (const auto motion = explanation(departure, found, target, source, icp))
+      explanations.push_back(*motion);
   }
   const auto best = std::max_element(
       explanations.begin(), explanations.end(),
@@ -169,6 +201,10 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   // It must be seen well enough; a worse one is no answer until then.
   if (best == explanations.end() || best->seen < kSeenShare) return std::nullopt;
   if (best->seen >= kWholeShare) return *best;
+  if (found.arrival != Arrival::kArrived &&
+      (best->fit < kSureFit || Eigen::AngleAxisd(best->T_new_old.linear()).angle() > kShiftRad)) {
+    return std::nullopt;
+  }
   // Of a small part of a flat face nobody can tell how far it slid.
   const auto centre_of = [&](const Motion& motion) -> Eigen::Vector3d {
     return motion.T_new_old * departure.box.pose.position_W;

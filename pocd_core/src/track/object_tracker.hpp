@@ -21,6 +21,8 @@
 
 namespace pocd {
 
+struct IcpResult;
+
 /// Owns the object library. Not thread-safe.
 class ObjectTracker {
  public:
@@ -119,6 +121,11 @@ class ObjectTracker {
   bool origin_in_doubt(const LibraryObject& object);
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
   std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found) const;
+  /// The same by one alignment of the found surface `source` with what departed, `target`; nothing
+  /// when what was seen speaks against it.
+  std::optional<Motion> explanation(const Departure& departure, const LibraryObject& found,
+                                    const IcpTarget& target, const Points& source,
+                                    const IcpResult& icp) const;
   bool may_tell(const Motion& motion, const Departure& departure, const LibraryObject& found,
                 StampNs now_ns) const;
   /// The known or new object that is what departed, by the shortest motion; or null.

@@ -139,6 +139,18 @@ TEST(PipelineChanges, SmallMovesAreMovesToo) {
   }
 }
 
+// Farther than it is long, but near: no other origin has to be waited for.
+TEST(PipelineChanges, AShortMoveOfASmallThingIsToldAtOnce) {
+  const Eigen::Vector3d small(0.3, 0.3, 0.6);
+  Drive drive;
+  drive.watch(room_with({solid(kBoxClass, {-0.5, 2.2}, small), right_cage()}), kLearn);
+  const auto box = drive.object_at(-0.5, 2.2);
+  ASSERT_TRUE(box);
+  const Scene after = room_with({solid(kBoxClass, {-0.08, 2.1}, small, 0.5), right_cage()});
+  ASSERT_GT(drive.watch_for(EventKind::kMoved, after, kPromptly), 0) << text(drive.events());
+  EXPECT_EQ(drive.of_kind(EventKind::kMoved)[0].object, box->id);
+}
+
 // A fifth of a metre and more, whichever way, along or across the view: one thing, at another
 // place.
 TEST(PipelineChanges, AThingThatIsPushedKeepsItsIdentity) {
