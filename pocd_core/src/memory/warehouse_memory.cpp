@@ -246,6 +246,7 @@ void WarehouseMemory::start(PocdPipeline& pipeline, const ClassMap& classes, con
   }
   // From here on what changes is noted; what was restored is on disk already.
   pipeline.map().keep_unsaved();
+  pipeline.note_looks();
   m.thread = std::thread([&m] { m.write_steps(); });
 }
 

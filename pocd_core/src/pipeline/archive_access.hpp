@@ -146,7 +146,7 @@ struct ArchiveAccess {
   }
 
   static StampNs& looked_ns(LookedAt& looked, const BlockKey& region) {
-    [[maybe_unused]] auto& [inverse_m, last_ns, fresh, changed, notes_changes] = looked;
+    [[maybe_unused]] auto& [inverse_m, last_ns, fresh, changed, on, notes_changes] = looked;
     return last_ns[region];
   }
 

@@ -68,7 +68,8 @@ class WarehouseMemory {
   /// Puts what is kept into a pipeline and a publisher that know nothing yet. Voxels follow when
   /// they are needed. Throws InputError, naming what is damaged.
   void restore(PocdPipeline& pipeline, MapPublisher& publisher);
-  /// Starts to write. Names of classes are kept for who reads the log.
+  /// Starts to write, and to note when regions are looked at. Names of classes are kept for who
+  /// reads the log.
   void start(PocdPipeline& pipeline, const ClassMap& classes, const MemoryRun& run);
 
   // The pipeline's thread:
