@@ -4,6 +4,7 @@
 
 #include "pocd/common/archive.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd/memory/memory_reader.hpp"
 
 namespace pocd {
@@ -70,10 +71,16 @@ void MapMemory::add(const FrameResult& result) {
   if (memory_) memory_->add(result);
 }
 
-void MapMemory::step(const MapProgress& progress, StampNs stamp_ns) {
+void MapMemory::step(const MapProgress& progress, StampNs stamp_ns, FrameResult& result) {
   if (!memory_ || !memory_->due()) return;
-  publisher_.update(pipeline_.map());
-  memory_->step(pipeline_, publisher_, stamp_ns, bytes_of(progress));
+  const auto timed = [&](const char* stage, const auto& work) {
+    const double wall_ms = clock_ms(CLOCK_MONOTONIC), cpu_ms = thread_cpu_ms();
+    work();
+    result.timings.push_back(
+        {stage, clock_ms(CLOCK_MONOTONIC) - wall_ms, thread_cpu_ms() - cpu_ms});
+  };
+  timed("publish", [&] { publisher_.update(pipeline_.map()); });
+  timed("memory", [&] { memory_->step(pipeline_, publisher_, stamp_ns, bytes_of(progress)); });
 }
 
 void MapMemory::finish(const MapProgress& progress, StampNs stamp_ns) {
@@ -82,6 +89,16 @@ void MapMemory::finish(const MapProgress& progress, StampNs stamp_ns) {
   if (!memory_->finish(pipeline_, publisher_, stamp_ns, bytes_of(progress))) {
     throw InputError(memory_->status().problem + ": the end of the run is not in the memory");
   }
+}
+
+void MapMemory::note(RunSummary& summary) const {
+  if (!memory_) return;
+  const MemoryStatus status = memory_->status();
+  summary.memory_steps = status.steps;
+  summary.memory_written_bytes = status.written_bytes;
+  summary.memory_file_bytes = status.file_bytes;
+  summary.memory_copy_cpu_ms = status.gather_cpu_ms;
+  summary.memory_write_cpu_ms = status.write_cpu_ms;
 }
 
 std::optional<std::string> MapMemory::take_problem() {

@@ -39,10 +39,13 @@ class MapMemory {
   void repeat_events(EventsCsv& events, const ClassMap& classes) const;
 
   void add(const FrameResult& result);
-  /// When a step is due. `progress` is after the last frame.
-  void step(const MapProgress& progress, StampNs stamp_ns);
+  /// When a step is due. `progress` is after the last frame, whose result gets the time it took:
+  /// stages "publish" (the map as a node publishes it) and "memory" (copying what has changed).
+  void step(const MapProgress& progress, StampNs stamp_ns, FrameResult& result);
   /// The run has ended. Throws InputError when the memory could not be written.
   void finish(const MapProgress& progress, StampNs stamp_ns);
+  /// What it took so far.
+  void note(RunSummary& summary) const;
   /// Why nothing is written at present, once.
   std::optional<std::string> take_problem();
 

@@ -1,13 +1,12 @@
 #include "map_run.hpp"
 
-#include <time.h>
-
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <ostream>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd/input/pose_quaternion.hpp"
 #include "pocd/map/birdseye.hpp"
@@ -25,12 +24,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 /// Of all threads: the simulator has several.
-double process_cpu_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
-
 /// A line on the terminal that renews itself a few times per second.
 class Progress {
  public:
@@ -159,7 +152,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
       events.add(event, options.config.classes.name(event.class_id));
     }
     count(result.events, progress_made);
-    memory.step(progress_made, stamp_ns);
+    memory.step(progress_made, stamp_ns, result);
     if (const auto problem = memory.take_problem()) report(*problem);
     result.timings.insert(result.timings.begin(), read);
     timing.add(*frame, result.timings);
@@ -169,6 +162,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
   events.close();
   timing.close();
   memory.finish(progress_made, stamp_ns);
+  memory.note(summary);
 }
 
 void write_map(const MapRunOptions& options, PocdPipeline& pipeline, MapPublisher& publisher,

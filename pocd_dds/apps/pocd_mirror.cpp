@@ -1,6 +1,7 @@
 // Follows the published map into a copy and writes it to files.
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <map>
 
@@ -47,6 +48,20 @@ bool reached(const Options& options, const pocd::MirrorStatus& status) {
   return options.until_in_step && status.in_step && status.version > 0;
 }
 
+/// As pocd_memory export writes it, and whether the publisher's run has looked.
+void write_regions(const pocd::MirrorContents& contents, const std::filesystem::path& file) {
+  const double side_m =
+      contents.voxel_size_m * (pocd::VoxelBlock::kSide << pocd::BlockKey::kRegionShift);
+  std::ofstream out(file);
+  out << "low_x,low_y,low_z,side,last_looked_ns,looked_in_run\n";
+  for (const pocd::MirrorRegion& region : contents.regions) {
+    out << region.region.x * side_m << ',' << region.region.y * side_m << ','
+        << region.region.z * side_m << ',' << side_m << ',' << region.last_looked_ns << ','
+        << region.looked_in_run << '\n';
+  }
+  if (!out.flush()) throw pocd::InputError(file.string() + ": cannot be written");
+}
+
 void write_files(const pocd::MirrorContents& contents, const std::filesystem::path& folder,
                  std::vector<pocd::BirdseyeChange> changes) {
   std::filesystem::create_directories(folder);
@@ -61,6 +76,7 @@ void write_files(const pocd::MirrorContents& contents, const std::filesystem::pa
   pocd::write_objects_csv(
       contents.objects, [&](pocd::ClassId id) { return contents.class_names.at(id); },
       folder / "objects.csv");
+  if (!contents.regions.empty()) write_regions(contents, folder / "regions.csv");
 }
 
 int follow(Options options) {
@@ -74,6 +90,7 @@ int follow(Options options) {
       events->add(event, name);
       if (options.changes_since_s) heard.push_back(event);
     };
+    options.mirror.looks = true;
     options.mirror.callbacks.when_full = pocd::WhenFull::kWait;  // the file has every event
   }
   auto mirror = std::make_unique<pocd::MapMirror>(options.mirror);
@@ -128,7 +145,8 @@ int main(int argc, char** argv) {
   Options options;
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--output", options.output,
-                 "Folder for events.csv, and at the end map.ply, birdseye.png and objects.csv");
+                 "Folder for events.csv, and at the end map.ply, birdseye.png, objects.csv, and\n"
+                 "regions.csv of a publisher with a memory");
   app.add_option("--changes-since", options.changes_since_s,
                  "Draw into birdseye.png what was added, moved or removed from this stamp on [s]")
       ->check(CLI::NonNegativeNumber);

@@ -124,6 +124,17 @@ int main(int argc, char** argv) {
         (work.intake_cpu_ms - work.take_cpu_ms) / frames,
         (work.process_cpu_ms - work.pipeline_cpu_ms - work.publishing_cpu_ms - work.intake_cpu_ms) /
             frames);
+    if (work.kept) {
+      spdlog::info(
+          "memory: {} steps, {:.2f} MB written, a file of {:.2f} MB; CPU per step [ms]: copying "
+          "{:.2f}, writing {:.2f}",
+          work.kept->steps, 1e-6 * static_cast<double>(work.kept->written_bytes),
+          1e-6 * static_cast<double>(work.kept->file_bytes),
+          work.kept->gather_cpu_ms /
+              static_cast<double>(std::max<std::uint64_t>(1, work.kept->steps)),
+          work.kept->write_cpu_ms /
+              static_cast<double>(std::max<std::uint64_t>(1, work.kept->steps)));
+    }
     return good ? 0 : 1;
   });
 }

@@ -80,6 +80,8 @@ inline constexpr TopicSpec kMapDeltas{"pocd/map/deltas", "pocd_msgs::msg::dds_::
                                       Direction::kOut, false, reliable(1000)};
 inline constexpr TopicSpec kMapManifest{"pocd/map/manifest", "pocd_msgs::msg::dds_::MapManifest_",
                                         Direction::kOut, true, latched(1)};
+inline constexpr TopicSpec kMapLooks{"pocd/map/looks", "pocd_msgs::msg::dds_::MapLooks_",
+                                     Direction::kOut, true, latched(1)};
 inline constexpr TopicSpec kSnapshotRequest{"pocd/map/snapshot_request",
                                             "pocd_msgs::msg::dds_::MapSnapshotRequest_",
                                             Direction::kBoth, false, reliable(10)};

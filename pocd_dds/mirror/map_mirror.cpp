@@ -9,6 +9,8 @@
 
 #include "mirror/callback_thread.hpp"
 #include "mirror/catch_up.hpp"
+#include "mirror/look_copy.hpp"
+#include "mirror/object_copy.hpp"
 #include "mirror/part_assembler.hpp"
 #include "mirror/publishers.hpp"
 #include "mirror/reading_thread.hpp"
@@ -70,7 +72,12 @@ struct MapMirror::Impl {
                       objects_of_all_maps(), wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
+        look_states(given.looks ? std::make_unique<dds::Reader<msg::MapLooksPubSubType>>(
+                                      participant, dds::topics::kMapLooks, wakeup)
+                                : nullptr),
         plan(given.catch_up),
+        objects(given.map_id),
+        looks(given.map_id),
         callbacks(given.callbacks, [this](const std::string& text) { tell(text); }),
         thread([this] { turn(); }, [this](const std::string& text) { tell(text); }) {}
 
@@ -86,20 +93,13 @@ struct MapMirror::Impl {
   bool ours(const Message& message) const {
     return message.map_id() == options.map_id && !publishers.foreign(message.epoch(), Clock::now());
   }
-  void take_objects();
   void take_events();
   void take_manifests();
   void take_deltas();
   void take_replies();
-  void forget_objects_of(std::uint64_t epoch);
-  /// Objects of the run before, of the same lineage, stay until the present one has told all it
-  /// knows.
-  void settle_objects();
-  bool is_ours(const msg::ObjectState& object) const {
-    return !manifest || object.epoch() == manifest->epoch() ||
-           object.lineage() == manifest->lineage();
-  }
   void take_tiles();
+  /// What the publisher that is followed says of itself; null before it was heard.
+  const msg::MapManifest* followed() const { return manifest ? &*manifest : nullptr; }
   void catch_up();
   void count_damaged();
   void ask();
@@ -114,6 +114,7 @@ struct MapMirror::Impl {
   dds::Reader<msg::ObjectStatePubSubType> object_states;
   dds::Reader<msg::ObjectEventPubSubType> events;
   dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
+  std::unique_ptr<dds::Reader<msg::MapLooksPubSubType>> look_states;  // null: not wanted
 
   // Only while snapshots are waited for, or tiles are gathered; by the thread.
   std::unique_ptr<dds::Reader<msg::MapSnapshotReplyPubSubType>> replies;
@@ -129,7 +130,8 @@ struct MapMirror::Impl {
   dds::Publishers publishers;
   std::optional<msg::MapManifest> manifest;
   dds::SampleMeta::Guid manifest_writer{};
-  std::map<std::array<std::uint8_t, 16>, msg::ObjectState> objects;
+  dds::ObjectCopy objects;
+  dds::LookCopy looks;
   dds::PartAssembler<std::pair<std::uint64_t, std::uint64_t>, msg::MapDelta> delta_parts;
   dds::PartAssembler<std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>, msg::MapSnapshotReply>
       reply_parts;
@@ -146,7 +148,8 @@ void MapMirror::Impl::turn() {
   take_events();
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    take_objects();
+    objects.take(object_states, kMost);
+    if (look_states) damaged += looks.take(*look_states, kMost);
     take_deltas();
     take_replies();
     take_manifests();
@@ -155,39 +158,6 @@ void MapMirror::Impl::turn() {
     catch_up();
   }
   changed.notify_all();
-}
-
-void MapMirror::Impl::take_objects() {
-  object_states.take_some(kMost, [&](const msg::ObjectState& state, const dds::SampleMeta& meta) {
-    if (meta.valid) {
-      if (state.map_id() != options.map_id) return;
-      if (state.forgotten()) {
-        objects.erase(state.uuid());
-      } else {
-        objects[state.uuid()] = state;
-      }
-    } else if (meta.disposed) {
-      objects.erase(meta.key);
-    }
-  });
-}
-
-void MapMirror::Impl::forget_objects_of(std::uint64_t epoch) {
-  for (auto object = objects.begin(); object != objects.end();) {
-    object = object->second.epoch() == epoch ? objects.erase(object) : std::next(object);
-  }
-}
-
-void MapMirror::Impl::settle_objects() {
-  if (!manifest) return;
-  std::size_t told = 0;
-  for (const auto& entry : objects) told += entry.second.epoch() == manifest->epoch();
-  if (told == objects.size() || told < manifest->object_count()) return;
-  for (auto object = objects.begin(); object != objects.end();) {
-    const bool before = object->second.lineage() == manifest->lineage() &&
-                        object->second.epoch() != manifest->epoch();
-    object = before ? objects.erase(object) : std::next(object);
-  }
 }
 
 void MapMirror::Impl::take_events() {
@@ -213,7 +183,6 @@ void MapMirror::Impl::take_manifests() {
     }
     manifest_writer = meta.writer;
     if (manifest && manifest->epoch() != message.epoch()) {
-      if (manifest->lineage() != message.lineage()) forget_objects_of(manifest->epoch());
       const auto of_this_run = [&](const auto& key) { return std::get<0>(key) == message.epoch(); };
       delta_parts.keep(of_this_run);
       reply_parts.keep(of_this_run);
@@ -221,7 +190,7 @@ void MapMirror::Impl::take_manifests() {
     follower.published(message.epoch(), message.version(), dds::digest_from(message.digest()));
     manifest = message;
   });
-  settle_objects();
+  if (manifest) objects.settle(*manifest);
   publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },
                          Clock::now());
 }
@@ -285,8 +254,9 @@ void MapMirror::Impl::take_tiles() {
 }
 
 void MapMirror::Impl::count_damaged() {
-  for (dds::RawReader* reader : std::initializer_list<dds::RawReader*>{
-           &manifests, &deltas, &object_states, &events, replies.get(), tiles.get()}) {
+  for (dds::RawReader* reader :
+       std::initializer_list<dds::RawReader*>{&manifests, &deltas, &object_states, &events,
+                                              look_states.get(), replies.get(), tiles.get()}) {
     if (reader != nullptr) problems.count_damaged(*reader);
   }
 }
@@ -351,9 +321,7 @@ MirrorStatus MapMirror::Impl::status_now() const {
   status.version = replica.version();
   status.digest = replica.digest();
   status.tiles = replica.tiles().size();
-  for (const auto& [key, object] : objects) {
-    status.objects += is_ours(object);
-  }
+  status.objects = objects.count(followed());
   status.publisher_present = publishers.present();
   status.publisher_seen = publishers.followed().has_value();
   const std::vector<std::uint64_t> rivals = publishers.rivals(Clock::now());
@@ -394,11 +362,8 @@ MirrorContents MapMirror::contents() const {
     contents.truncation_m = impl_->manifest->truncation();
     contents.frame_id = impl_->manifest->frame_id();
   }
-  for (const auto& [key, state] : impl_->objects) {
-    if (!impl_->is_ours(state)) continue;
-    contents.objects.push_back(dds::object_from(state));
-    contents.class_names[state.class_id()] = state.class_name();
-  }
+  impl_->objects.add_to(contents, impl_->followed());
+  impl_->looks.add_to(contents, impl_->followed());
   return contents;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd/input/robot_topic.hpp"
 #include "pocd_dds/node/input_delivery.hpp"
 

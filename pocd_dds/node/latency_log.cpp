@@ -1,10 +1,9 @@
 #include "pocd_dds/node/latency_log.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -12,17 +11,9 @@ namespace {
 /// Many more frames than wait anywhere: the others were dropped.
 constexpr std::size_t kMostOnTheWay = 1000;
 
-double clock_ms(clockid_t clock) {
-  timespec t{};
-  clock_gettime(clock, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 double now_ms() { return clock_ms(CLOCK_REALTIME); }  // the clock of the reception
 
 }  // namespace
-
-double thread_cpu_ms() { return clock_ms(CLOCK_THREAD_CPUTIME_ID); }
-double process_cpu_ms() { return clock_ms(CLOCK_PROCESS_CPUTIME_ID); }
 
 LatencyLog::LatencyLog(const std::string& file) {
   if (file.empty()) return;

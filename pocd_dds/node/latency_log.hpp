@@ -46,9 +46,4 @@ class LatencyLog {
   double longest_ms_ = 0.0;
 };
 
-/// CPU time of the calling thread so far [ms].
-double thread_cpu_ms();
-/// CPU time of the whole process so far [ms].
-double process_cpu_ms();
-
 }  // namespace pocd::dds

@@ -55,10 +55,10 @@ void MapPublication::restored(StampNs stamp_ns) {
   announced_ = {publisher_.version(), publisher_.digest(), publisher_.tiles().size(), stamp_ns};
 }
 
-void MapPublication::looked_at(const std::vector<BlockKey>& regions) {
+void MapPublication::looked_at(const std::vector<RegionLook>& looks) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (not_looked_.empty()) return;
-  for (const BlockKey& region : regions) {
+  for (const auto& [region, stamp_ns] : looks) {
     if (not_looked_.erase(region) == 0) continue;
     constexpr std::int32_t kTiles = (1 << BlockKey::kRegionShift) / 2;  // along a side
     for (std::int32_t i = 0; i < kTiles * kTiles * kTiles; ++i) {

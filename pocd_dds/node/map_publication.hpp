@@ -10,6 +10,7 @@
 
 #include "pocd/config/node_config.hpp"
 #include "pocd/memory/warehouse_memory.hpp"
+#include "pocd/pipeline/pocd_pipeline.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/entities/reader.hpp"
@@ -36,7 +37,7 @@ class MapPublication {
   /// Goes on from what another run has published: publisher() has been restored. Before all others.
   void restored(StampNs stamp_ns);
   /// The thread that changes the map: regions that were looked at in this run.
-  void looked_at(const std::vector<BlockKey>& regions);
+  void looked_at(const std::vector<RegionLook>& looks);
   /// Regions from before this run that were not looked at since; while hold() is held.
   const std::set<BlockKey>& not_looked() const { return not_looked_; }
   /// To be restored.

@@ -11,11 +11,13 @@
 #include <thread>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 #include "pocd_dds/node/command_desk.hpp"
 #include "pocd_dds/node/event_feed.hpp"
 #include "pocd_dds/node/frame_log.hpp"
 #include "pocd_dds/node/latency_log.hpp"
+#include "pocd_dds/node/look_publication.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 #include "pocd_dds/node/node_memory.hpp"
 #include "pocd_dds/node/object_publication.hpp"
@@ -55,23 +57,27 @@ struct Node::Impl {
         frames(participant, options.epoch),
         objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
         map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
-        feed(keeper.on() ? std::make_unique<EventFeed>(participant, config, wakeup) : nullptr),
-        desk(config.node.commands ? std::make_unique<CommandDesk>(
-                                        participant,
-                                        MapRun{static_cast<std::uint32_t>(config.node.map_id),
-                                               options.epoch, keeper.lineage(options.epoch)},
-                                        wakeup)
-                                  : nullptr),
-        restored((keeper.restore(pipeline, map, objects, options.epoch, options.bus.name), true)),
-        status(participant, options.bus.name, options.epoch, config.node.outputs.diagnostics_hz),
-        health(config.node.health_window_s, config.node.stall_s),
-        intake(participant, config.node, config.pipeline, watch, queue, latency),
-        worker([this] { guard("pocd_worker", [this] { work(); }); }),
-        teller([this] { guard("pocd_teller", [this] { tell(); }); }),
-        drawer([this] { guard("pocd_drawer", [this] { draw(); }); }) {}
+        health(config.node.health_window_s, config.node.stall_s) {
+    const MapRun run{static_cast<std::uint32_t>(config.node.map_id), options.epoch,
+                     keeper.lineage(options.epoch)};
+    if (config.node.commands) desk = std::make_unique<CommandDesk>(participant, run, wakeup);
+    if (keeper.on()) {
+      feed = std::make_unique<EventFeed>(participant, config, wakeup);
+      looks = std::make_unique<LookPublication>(participant, run);
+      keeper.restore(pipeline, map, objects, *looks, options.epoch, options.bus.name);
+    }
+    // What says that the node is there, and what brings frames, comes after all that is known.
+    status = std::make_unique<StatusPublication>(participant, options.bus.name, options.epoch,
+                                                 config.node.outputs.diagnostics_hz);
+    intake =
+        std::make_unique<Intake>(participant, config.node, config.pipeline, watch, queue, latency);
+    worker = std::thread([this] { guard("pocd_worker", [this] { work(); }); });
+    teller = std::thread([this] { guard("pocd_teller", [this] { tell(); }); });
+    drawer = std::thread([this] { guard("pocd_drawer", [this] { draw(); }); });
+  }
 
   ~Impl() {
-    intake.stop();
+    intake->stop();
     if (worker.joinable()) worker.join();
     stop(told, tellers_wakeup, teller);
     stop(drawn, outputs_wakeup, drawer);
@@ -131,20 +137,20 @@ struct Node::Impl {
   ObjectPublication objects;
   MapPublication map;
   Pulse worker_pulse, teller_pulse;
-  std::unique_ptr<EventFeed> feed;    // run()'s thread only; null without a memory
-  std::unique_ptr<CommandDesk> desk;  // guards itself; null without node.commands
+  std::unique_ptr<EventFeed> feed;         // run()'s thread only; null without a memory
+  std::unique_ptr<LookPublication> looks;  // guards itself; null without a memory
+  std::unique_ptr<CommandDesk> desk;       // guards itself; null without node.commands
   WorkStatus counts;
   double busy_ms = 0.0;
   std::uint64_t busy_frames = 0;
   std::exception_ptr failure;
   std::atomic<bool> failed{false}, worked{false};
-  const bool restored;  // before frames come
 
-  // run()'s thread only; its writers are made after all others.
-  StatusPublication status;
+  // run()'s thread only.
+  std::unique_ptr<StatusPublication> status;
   HealthRule health;
 
-  Intake intake;
+  std::unique_ptr<Intake> intake;
   std::thread worker, teller, drawer;
 };
 
@@ -163,7 +169,7 @@ void Node::Impl::work() {
   while (!queue.finished()) {
     const std::optional<Frame> frame = queue.pop(kPoll);
     if (frame) {
-      intake.room_made();
+      intake->room_made();
       process(*frame);
     }
     publish(follow_words());
@@ -227,7 +233,11 @@ void Node::Impl::process(const Frame& frame) {
     counts.last_warning = frame.robot + " frame " + std::to_string(frame.sequence) + ": " + warning;
     if (counts.warnings++ == 0) spdlog::warn("{} (more in diagnostics)", counts.last_warning);
   }
-  map.looked_at(pipeline.take_looked_at());
+  if (looks) {
+    const std::vector<RegionLook> fresh = pipeline.take_looks();
+    map.looked_at(fresh);
+    looks->looked_at(fresh);
+  }
   frames.processed(frame);
   for (const DroppedFrame& dropped : queue.take_dropped()) frames.dropped(dropped);
   objects.add(result, frame.stamp_ns);
@@ -322,7 +332,7 @@ NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
     signs.still_thread = thread;
   };
   look("the pipeline", worker_pulse.still_s(), worked);
-  look("the intake", intake.still_s(), ending);
+  look("the intake", intake->still_s(), ending);
   look("the writer of objects", teller_pulse.still_s(), told);
   NodeState state{word, false, signs.still_s, health.judge(signs, Clock::now())};
   state.ready = !ending && signs.still_s < config.node.stall_s;
@@ -330,7 +340,7 @@ NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
 }
 
 void Node::Impl::send_status(const std::string& word) {
-  IntakeStatus input = intake.status();
+  IntakeStatus input = intake->status();
   add_problems(input);
   WorkStatus work;
   {
@@ -343,7 +353,8 @@ void Node::Impl::send_status(const std::string& word) {
     counts.take_cpu_ms = input.take_cpu_ms;
     counts.process_cpu_ms = process_cpu_ms();
     counts.write_failures = objects.failures() + map.failures() + frames.failures() +
-                            (feed ? feed->failures() : 0) + (desk ? desk->failures() : 0);
+                            (feed ? feed->failures() : 0) + (looks ? looks->failures() : 0) +
+                            (desk ? desk->failures() : 0);
     counts.map = map.traffic();
     counts.objects = objects.count();
     counts.kept = keeper.on() ? std::make_optional(keeper.status()) : std::nullopt;
@@ -353,7 +364,7 @@ void Node::Impl::send_status(const std::string& word) {
                     work.kept.value_or(MemoryStatus{}));
   const NodeState state = judge(input, work, word);
   failing = state.verdict.level >= 2;
-  status.send(input, work, queue.size(), queue.dropped(), state, clock.now_ns());
+  status->send(input, work, queue.size(), queue.dropped(), state, clock.now_ns());
   if (on_status) on_status(state, ending);
 }
 
@@ -382,6 +393,7 @@ void Node::Impl::turn() {
   map.answer_requests();
   map.send_waiting();
   if (feed) feed->answer();
+  if (looks) looks->send_due();
   answer_words();
   {
     const std::lock_guard<std::mutex> lock(mutex);
@@ -398,7 +410,7 @@ void Node::Impl::turn() {
 
 bool Node::Impl::finish() {
   ending = true;
-  intake.stop();
+  intake->stop();
   // What is queued may take seconds: subscribers go on to hear of it, and that the node is there.
   while (!worked && !failed) turn();
   worker.join();
@@ -406,7 +418,7 @@ bool Node::Impl::finish() {
   stop(told, tellers_wakeup, teller);
   stop(drawn, outputs_wakeup, drawer);
   if (failure) std::rethrow_exception(failure);
-  intake.rethrow();
+  intake->rethrow();
   const auto wait =
       std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * config.node.shutdown_wait_s));
   // The manifest that says that this was all follows the last delta.
@@ -426,7 +438,8 @@ bool Node::Impl::finish() {
   // A late subscriber that asked for a snapshot just now still gets it.
   const bool acknowledged = map.waiting() == 0 && objects.wait_acknowledged(end) &&
                             map.wait_acknowledged(end) && frames.wait_acknowledged(end) &&
-                            status.wait_acknowledged(end) && outputs.wait_acknowledged(end);
+                            status->wait_acknowledged(end) && outputs.wait_acknowledged(end) &&
+                            (!looks || looks->finish(end));
   if (!acknowledged) spdlog::error("subscribers did not acknowledge the last state in time");
   return acknowledged && !failing;
 }
@@ -440,7 +453,7 @@ Node::~Node() = default;
 
 bool Node::run(const std::atomic<bool>& stop) {
   Impl& node = *impl_;
-  while (!stop && !node.failed && !node.intake.failed()) node.turn();
+  while (!stop && !node.failed && !node.intake->failed()) node.turn();
   return node.finish();
 }
 

@@ -24,8 +24,7 @@ std::uint64_t NodeMemory::lineage(std::uint64_t epoch) const {
 }
 
 void NodeMemory::restore(PocdPipeline& pipeline, MapPublication& map, ObjectPublication& objects,
-                         std::uint64_t epoch, const std::string& name) {
-  if (!memory_) return;
+                         LookPublication& looks, std::uint64_t epoch, const std::string& name) {
   const auto start = std::chrono::steady_clock::now();
   memory_->restore(pipeline, map.publisher_to_restore());
   if (memory_->holds_something()) {
@@ -34,6 +33,7 @@ void NodeMemory::restore(PocdPipeline& pipeline, MapPublication& map, ObjectPubl
     const std::vector<ObjectSnapshot> known = pipeline.objects();
     map.restored(memory_->stamp_ns());
     objects.restore(known, memory_->stamp_ns());
+    looks.restored(pipeline.looks());
     spdlog::info("memory {}: lineage {:016x}, {} objects, {} tiles, map version {}, in {:.2f} s{}",
                  config_.node.memory.folder, memory_->lineage(), known.size(),
                  map.publisher().tiles().size(), map.publisher().version(),

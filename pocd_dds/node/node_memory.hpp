@@ -5,6 +5,7 @@
 
 #include "pocd/memory/warehouse_memory.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
+#include "pocd_dds/node/look_publication.hpp"
 #include "pocd_dds/node/map_publication.hpp"
 #include "pocd_dds/node/object_publication.hpp"
 
@@ -19,9 +20,10 @@ class NodeMemory {
 
   /// Of the memory; without one, of the run.
   std::uint64_t lineage(std::uint64_t epoch) const;
-  /// Puts what is kept into the pipeline and on the bus, and starts to keep. Throws InputError.
+  /// Puts what is kept into the pipeline and on the bus, and starts to keep; only when on().
+  /// Throws InputError.
   void restore(PocdPipeline& pipeline, MapPublication& map, ObjectPublication& objects,
-               std::uint64_t epoch, const std::string& name);
+               LookPublication& looks, std::uint64_t epoch, const std::string& name);
 
   void add(const FrameResult& result);
   /// The next step is not to wait until its period is over.

@@ -23,7 +23,9 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
   }
   for (const ObjectSnapshot& object : result.changed_objects) {
     ObjectSnapshot& known = objects_[object.id] = object;
-    known.seen_in_run = !known_until_ns_ || object.last_seen_ns > *known_until_ns_;
+    // By this frame: stamps of before may be later, when the clocks were set back.
+    if (object.last_seen_ns == stamp_ns) unseen_.erase(object.id);
+    known.seen_in_run = unseen_.count(object.id) == 0;
     changed_.insert(object.id);
     touched_.insert(object.id);
   }
@@ -32,6 +34,7 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
     if (event.kind == EventKind::kOperator) forgotten.insert(event.object);
   }
   for (const ObjectId id : result.retired) {
+    unseen_.erase(id);
     const auto known = objects_.find(id);
     if (known != objects_.end() && forgotten.count(id) > 0) {
       forgotten_.push_back(std::move(known->second));
@@ -61,10 +64,15 @@ void ObjectPublication::send_events() {
 }
 
 void ObjectPublication::restore(const std::vector<ObjectSnapshot>& objects, StampNs stamp_ns) {
-  known_until_ns_ = stamp_ns;
-  FrameResult known;
-  known.changed_objects = objects;
-  add(known, stamp_ns);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  stamp_ns_ = stamp_ns;
+  for (const ObjectSnapshot& object : objects) {
+    objects_[object.id] = object;
+    objects_[object.id].seen_in_run = false;
+    unseen_.insert(object.id);
+    changed_.insert(object.id);
+    touched_.insert(object.id);
+  }
 }
 
 void ObjectPublication::dispose_gone() {

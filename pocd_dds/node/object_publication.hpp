@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -88,7 +87,7 @@ class ObjectPublication {
   std::deque<ObjectEvent> events_waiting_;
   std::uint64_t dropped_events_ = 0;
   StampNs stamp_ns_ = 0;
-  std::optional<StampNs> known_until_ns_;  // from the memory; later sights are of this run
+  std::set<ObjectId> unseen_;  // known from the memory, and not seen by this run
 };
 
 }  // namespace pocd::dds

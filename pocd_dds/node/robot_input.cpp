@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd_dds/node/input_delivery.hpp"
 
 namespace pocd::dds {

@@ -58,6 +58,8 @@ void add_kept(diagnostic_msgs::msg::DiagnosticStatus& status, const MemoryStatus
   add(status, "memory file [bytes]", std::to_string(kept.file_bytes));
   add(status, "memory written [bytes]", std::to_string(kept.written_bytes));
   add(status, "memory last step [ms]", std::to_string(kept.write_ms));
+  add(status, "memory CPU of copying [ms]", std::to_string(kept.gather_cpu_ms));
+  add(status, "memory CPU of writing [ms]", std::to_string(kept.write_cpu_ms));
   if (!kept.problem.empty()) add(status, "memory problem", kept.problem);
 }
 

@@ -7,6 +7,7 @@
 #include "pocd/common/check.hpp"
 #include "pocd/common/random.hpp"
 #include "pocd_dds/bridge/image_visit.hpp"
+#include "pocd_dds/bridge/look_messages.hpp"
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "sensor_msgsPubSubTypes.h"
@@ -280,6 +281,31 @@ TEST(ObjectUuid, IsNeverTheSameForTwoObjectsOrRuns) {
   EXPECT_NE(object_uuid(1, ObjectId{2}), object_uuid(2, ObjectId{1}));
   EXPECT_NE(object_uuid(1, ObjectId{1}), object_uuid(1, ObjectId{256}));
   EXPECT_EQ(object_uuid(3, ObjectId{4}), object_uuid(3, ObjectId{4}));
+}
+
+TEST(LookMessages, CarryARegionsLastLookAndNothingThatCannotBe) {
+  const dds::SectorKey sector = dds::sector_of({-1, 7, 8});
+  EXPECT_TRUE((sector == dds::SectorKey{-1, 0, 1}));
+  const std::map<BlockKey, dds::SectorLook> regions{{{-1, 7, 8}, {1'500'000'000, false}},
+                                                    {{-8, 0, 15}, {-2, true}}};
+  const auto message = dds::looks_message(sector, regions, {3, 5, 7});
+  EXPECT_EQ(message.map_id(), 3u);
+  EXPECT_EQ(message.epoch(), 5u);
+  EXPECT_EQ(message.lineage(), 7u);
+  const auto back = dds::looks_from(message);
+  ASSERT_TRUE(back);
+  ASSERT_EQ(back->size(), regions.size());
+  for (const auto& [region, look] : regions) {
+    ASSERT_EQ(back->count(region), 1u);
+    EXPECT_EQ(back->at(region).stamp_ns, look.stamp_ns);
+    EXPECT_EQ(back->at(region).in_run, look.in_run);
+  }
+  auto outside = message;
+  outside.regions().front().x(0);
+  EXPECT_FALSE(dds::looks_from(outside)) << "a region of another sector";
+  auto twice = message;
+  twice.regions().push_back(twice.regions().front());
+  EXPECT_FALSE(dds::looks_from(twice));
 }
 
 TEST(DeltaMessages, PartsCarryTheWholeStepAndDamageIsNoticed) {

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "bus_harness.hpp"
+#include "nav_msgsPubSubTypes.h"
 #include "pocd/common/check.hpp"
 #include "pocd/memory/memory_reader.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
@@ -154,6 +155,85 @@ TEST_F(NodeMemoryTest, AKilledNodeGoesOnAndFollowersKeepTheirObjects) {
   second.signal(SIGINT);
   EXPECT_EQ(second.wait().exit_code, 0);
   EXPECT_TRUE(MemoryReader(folder()).info().ended_clean);
+}
+
+TEST_F(NodeMemoryTest, RegionsSayWhenTheyWereLastLookedAt) {
+  MirrorOptions with_looks = on(domain_);
+  with_looks.looks = true;
+  MapMirror mirror(with_looks);
+  {
+    Process first(node({"--epoch", "1"}));
+    ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "70"})).exit_code, 0);
+    first.signal(SIGINT);
+    ASSERT_EQ(first.wait().exit_code, 0);
+  }
+  const auto stored = MemoryReader(folder()).last_looks();
+  ASSERT_FALSE(stored.empty());
+  // The copy says just what is stored, and whether the run has looked.
+  const auto says = [&](const MapMirror& who, bool in_run) {
+    const std::vector<MirrorRegion> regions = who.contents().regions;
+    if (regions.size() != stored.size()) return false;
+    for (std::size_t i = 0; i < stored.size(); ++i) {
+      if (!(regions[i].region == stored[i].first) || regions[i].looked_in_run != in_run ||
+          regions[i].last_looked_ns != stored[i].second) {
+        return false;
+      }
+    }
+    return true;
+  };
+  EXPECT_TRUE(eventually([&] { return says(mirror, true); }));
+  Process second(node({"--epoch", "2"}));
+  EXPECT_TRUE(eventually([&] { return mirror.status().epoch == 2 && says(mirror, false); }));
+  MapMirror late(with_looks);
+  EXPECT_TRUE(eventually([&] { return says(late, false); }));
+  const MapMirror without(on(domain_));
+  ASSERT_TRUE(without.wait_until([](const MirrorStatus& s) { return s.in_step && s.epoch == 2; },
+                                 kGenerous));
+  EXPECT_TRUE(without.contents().regions.empty()) << "nobody asked for it";
+  ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "5"})).exit_code, 0);
+  EXPECT_TRUE(eventually([&] {
+    const auto regions = late.contents().regions;
+    return std::any_of(regions.begin(), regions.end(),
+                       [](const MirrorRegion& r) { return r.looked_in_run; });
+  }));
+  second.signal(SIGINT);
+  EXPECT_EQ(second.wait().exit_code, 0);
+}
+
+TEST_F(NodeMemoryTest, TheGridShowsWhatNobodyHasLookedAtAsConfigured) {
+  {
+    Process first(node());
+    ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "70"})).exit_code, 0);
+    first.signal(SIGINT);
+    ASSERT_EQ(first.wait().exit_code, 0);
+  }
+  const auto participant = test_participant(domain_);
+  dds::Wakeup wakeup;
+  for (const int value : {-1, 50}) {
+    SCOPED_TRACE(value);
+    dds::Reader<nav_msgs::msg::OccupancyGridPubSubType> grids(participant, dds::topics::kOccupancy,
+                                                              wakeup);
+    Process again(node({"--set", "node.outputs.occupancy_not_looked_at=" + std::to_string(value)}));
+    // Free, occupied, as configured, anything else; of the newest grid.
+    std::map<int, int> cells;
+    const auto take = [&] {
+      nav_msgs::msg::OccupancyGrid grid;
+      dds::SampleMeta meta;
+      while (grids.take(grid, meta)) {
+        if (!meta.valid) continue;
+        cells.clear();
+        for (const std::int8_t cell : grid.data()) ++cells[cell];
+      }
+      return !cells.empty();
+    };
+    ASSERT_TRUE(eventually(take));
+    EXPECT_EQ(cells.count(0) + cells.count(100), 0u) << "nobody has looked";
+    EXPECT_GT(cells[value], 0);
+    ASSERT_EQ(run_command(play_command(domain_, {"--max-frames", "70"})).exit_code, 0);
+    EXPECT_TRUE(eventually([&] { return take() && cells[0] > 0 && cells[100] > 0; }));
+    again.signal(SIGINT);
+    EXPECT_EQ(again.wait().exit_code, 0);
+  }
 }
 
 TEST_F(NodeMemoryTest, EventsSinceANumberAcrossRestarts) {

@@ -9,8 +9,9 @@
 namespace pocd {
 namespace {
 
-// The folder's own build of the installed example.
-std::string built_lane_watch(const TemporaryFolder& folder) {
+/// The installed example, in a build of its own that lasts for all tests.
+std::string built_lane_watch() {
+  static const TemporaryFolder folder;
   const std::string prefix = POCD_BIN_DIR "/..", build = (folder.path() / "build").string();
   const CommandResult configured = run_command(
       {POCD_CMAKE, "-S", prefix + "/share/pocd_dds/examples/lane_watch", "-B", build,
@@ -21,27 +22,31 @@ std::string built_lane_watch(const TemporaryFolder& folder) {
   return build + "/lane_watch";
 }
 
-TEST(Example, LaneWatchSeesWhatComesAndGoes) {
-  const std::string text = read_text(source("pocd_dds/examples/lane_watch/lane_watch.cpp"));
-  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 60) << "is to be read at a glance";
-  const TemporaryFolder folder;
-  const std::string program = built_lane_watch(folder);
-  ASSERT_FALSE(HasFailure());
-
-  const TestDomain domain;
-  const auto start = [&](const std::vector<std::string>& lane) {
+struct Lanes {
+  std::unique_ptr<Process> start(const std::vector<std::string>& lane) const {
     std::vector<std::string> command{program, domain.text(), "0.6"};
     command.insert(command.end(), lane.begin(), lane.end());
     return std::make_unique<Process>(command);
-  };
-  const auto says = [&](const Process& process, const std::string& words, std::size_t n = 1) {
-    return eventually([&] { return count_of(process.out(), words) >= n; });
-  };
+  }
+  const std::string program = built_lane_watch();
+  const TestDomain domain;
+};
+
+bool says(const Process& process, const std::string& words, std::size_t n = 1) {
+  return eventually([&] { return count_of(process.out(), words) >= n; });
+}
+
+TEST(Example, LaneWatchSeesWhatComesAndGoes) {
+  const std::string text = read_text(source("pocd_dds/examples/lane_watch/lane_watch.cpp"));
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 60) << "is to be read at a glance";
+  const Lanes lanes;
+  ASSERT_FALSE(HasFailure());
+  const TestDomain& domain = lanes.domain;
   // Past the box in the north, that is gone on the second drive, around a corner; past the one in
   // the south, that stays; and where nothing ever stands.
-  const auto north = start({"-2", "0.5", "-2", "2", "0.5", "2"});
-  const auto south = start({"-2", "-2", "2", "-2"});
-  const auto empty = start({"-1", "0", "0.5", "0"});
+  const auto north = lanes.start({"-2", "0.5", "-2", "2", "0.5", "2"});
+  const auto south = lanes.start({"-2", "-2", "2", "-2"});
+  const auto empty = lanes.start({"-1", "0", "0.5", "0"});
   ASSERT_TRUE(says(*south, "no component")) << south->out();
   Process killed(node_command(domain, {"--lossless"}));
   ASSERT_EQ(run_command(play_command(domain)).exit_code, 0);
@@ -66,6 +71,31 @@ TEST(Example, LaneWatchSeesWhatComesAndGoes) {
   EXPECT_TRUE(says(*south, "no component", 3)) << south->out();
   EXPECT_EQ(south->out().find("no longer"), std::string::npos) << south->out();
   EXPECT_EQ(empty->out().find("blocked"), std::string::npos) << empty->out();
+}
+
+TEST(Example, LaneWatchCallsUnknownWhatARestartedNodeRemembers) {
+  const Lanes lanes;
+  ASSERT_FALSE(HasFailure());
+  const TemporaryFolder folder;
+  const std::vector<std::string> memory{"--lossless", "--set",
+                                        "node.memory.folder=" + folder.path().string()};
+  const auto south = lanes.start({"-2", "-2", "2", "-2"});
+  {
+    Process first(node_command(lanes.domain, memory));
+    ASSERT_EQ(run_command(play_command(lanes.domain)).exit_code, 0);
+    ASSERT_TRUE(says(*south, "blocked by box")) << south->out();
+    first.signal(SIGINT);
+    ASSERT_EQ(first.wait().exit_code, 0);
+  }
+  // The box is known, but no robot has looked: unknown, although nothing drives.
+  Process second(node_command(lanes.domain, memory));
+  EXPECT_TRUE(says(*south, "unknown since the component restarted: box")) << south->out();
+  EXPECT_EQ(count_of(south->out(), "blocked by box"), 1u) << south->out();
+  ASSERT_EQ(run_command(play_command(lanes.domain)).exit_code, 0);
+  EXPECT_TRUE(says(*south, "\nblocked by box", 2)) << south->out();
+  EXPECT_EQ(south->out().find("no longer"), std::string::npos) << south->out();
+  second.signal(SIGINT);
+  EXPECT_EQ(second.wait().exit_code, 0);
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "pocd/common/thread_pool.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 
 namespace pocd {
 namespace {
@@ -32,12 +31,6 @@ void look_for(const Condition& condition) {
   while (!condition() && std::chrono::steady_clock::now() < end) {
     for (int i = 0; i < 16; ++i) relax();
   }
-}
-
-double thread_cpu_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
 }  // namespace

@@ -1,18 +1,10 @@
 #include "pocd/eval/evaluation.hpp"
 
-#include <time.h>
-
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 
 namespace pocd {
 namespace {
-
-/// CPU time of this thread [ms]: runs beside this one do not count.
-double cpu_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
 
 /// Measured depth within this of a voxel's own still is that voxel: two voxels of the map.
 constexpr double kSeenMargin_voxels = 2.0;
@@ -91,9 +83,9 @@ RunScore evaluate_run(EvaluationInput input, const std::vector<MethodSpec>& meth
       while (c.run.objects_at_visit_begin.size() <= visit) {
         c.run.objects_at_visit_begin.push_back(c.route->objects());
       }
-      const double before_ms = cpu_ms();
+      const double before_ms = thread_cpu_ms();
       const FrameResult result = c.route->process(*frame);
-      c.cpu_total_ms += cpu_ms() - before_ms;
+      c.cpu_total_ms += thread_cpu_ms() - before_ms;
       note(result, static_cast<std::size_t>(frame->sequence), places,
            input.truth ? input.truth->place_tolerance_m : kPlaceTolerance_m, c);
       if (visit == last && c.alone) c.alone->process(*frame);

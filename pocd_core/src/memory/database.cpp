@@ -76,6 +76,10 @@ void Statement::run() {
 
 void Statement::reset() { sqlite3_reset(statement_.get()); }
 
+bool Statement::has(int column) const {
+  return sqlite3_column_type(statement_.get(), column) != SQLITE_NULL;
+}
+
 std::int64_t Statement::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
 }
@@ -110,8 +114,10 @@ Database::Database(const std::filesystem::path& file, Access access) : name_(fil
   sqlite3_busy_timeout(raw, kWait_ms);
   sqlite3_db_config(raw, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(raw, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  // Of a new file only. Rows of a few kB leave less of a small page empty.
-  if (access == Access::kWrite) execute("PRAGMA page_size = 1024");
+  // Of a new file only. Rows of a few kB leave less of a small page empty, and pages that are not
+  // used any more can be given back.
+  if (access == Access::kWrite)
+    execute("PRAGMA page_size = 1024; PRAGMA auto_vacuum = INCREMENTAL");
   execute("PRAGMA cell_size_check = ON; PRAGMA temp_store = MEMORY;");
 }
 

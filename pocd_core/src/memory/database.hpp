@@ -43,6 +43,7 @@ class Statement {
   void run();
   void reset();
 
+  bool has(int column) const;  ///< false: null
   std::int64_t integer(int column) const;
   std::string text(int column) const;
   std::vector<std::uint8_t> blob(int column) const;

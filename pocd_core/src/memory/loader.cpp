@@ -53,6 +53,16 @@ Total read_rows(Database& database, Table table,
   return total;
 }
 
+MapTile tile_row(std::int64_t key, std::vector<std::uint8_t> data, const std::string& source) {
+  MapTile tile;
+  tile.key = tile_of(key);
+  if (data.size() <= sizeof tile.version) throw InputError(source + ": is cut short");
+  std::memcpy(&tile.version, data.data(), sizeof tile.version);
+  data.erase(data.begin(), data.begin() + sizeof tile.version);
+  tile.payload = std::move(data);
+  return tile;
+}
+
 std::pair<std::uint8_t, std::vector<std::uint32_t>> index_row(
     const std::vector<std::uint8_t>& bytes, const std::string& source) {
   std::pair<std::uint8_t, std::vector<std::uint32_t>> row;
@@ -70,26 +80,22 @@ Loaded load(Database& database, const StoredState& state) {
                      std::to_string(found.rows) + " rows that are not the " +
                      std::to_string(state.totals[table].rows) + " of the last step");
   };
-  for (const Table table : {kParts, kObjects, kFreeSpaceTable, kRegionsTable}) {
+  for (const Table table : {kParts, kObjects, kSurfaces, kFreeSpaceTable, kRegionsTable}) {
     check(table, read_rows(
                      database, table,
                      [&](std::int64_t key, std::vector<std::uint8_t> data) {
                        loaded.pieces.push_back(
-                           {static_cast<PieceKind>(table), static_cast<std::uint64_t>(key),
-                            decompress(data.data(), data.size(), kLargestPiece, "piece")});
+                           {static_cast<PieceKind>(table),
+                            static_cast<std::uint64_t>(key),
+                            decompress(data.data(), data.size(), kLargestPiece, "piece"),
+                            {}});
                      },
                      refuse));
   }
   check(kTiles, read_rows(
                     database, kTiles,
                     [&](std::int64_t key, std::vector<std::uint8_t> data) {
-                      MapTile tile;
-                      tile.key = tile_of(key);
-                      if (data.size() <= sizeof tile.version) throw InputError("is cut short");
-                      std::memcpy(&tile.version, data.data(), sizeof tile.version);
-                      data.erase(data.begin(), data.begin() + sizeof tile.version);
-                      tile.payload = std::move(data);
-                      loaded.tiles.push_back(std::move(tile));
+                      loaded.tiles.push_back(tile_row(key, std::move(data), "tile"));
                     },
                     refuse));
   // The 64 tiles of a region follow each other.
@@ -123,8 +129,9 @@ Loaded load(Database& database, const StoredState& state) {
 VoxelsOf::VoxelsOf(Database& database)
     : database_(database),
       rows_(database_,
-            "SELECT i.key, i.data, v.sum, v.data FROM voxel_index i LEFT JOIN voxels v "
-            "ON v.key = i.key WHERE i.key BETWEEN ?1 AND ?2 ORDER BY i.key") {}
+            "SELECT i.key, i.data, v.sum, v.data, t.sum, t.data FROM voxel_index i "
+            "LEFT JOIN voxels v ON v.key = i.key LEFT JOIN tiles t ON t.key = i.key "
+            "WHERE i.key BETWEEN ?1 AND ?2 ORDER BY i.key") {}
 
 std::vector<VoxelBlock> VoxelsOf::read(const BlockKey& region) const {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -136,13 +143,22 @@ std::vector<VoxelBlock> VoxelsOf::read(const BlockKey& region) const {
       const std::int64_t key = rows_.integer(0);
       const std::string source = row_name(database_, "voxels", key);
       const auto mask = index_row(rows_.blob(1), source).first;
-      const std::vector<std::uint8_t> data = rows_.blob(3);
-      if (static_cast<std::uint64_t>(rows_.integer(2)) !=
-          row_sum(static_cast<std::uint64_t>(key), data.data(), data.size())) {
-        throw InputError(source + " is damaged");
+      // Column of the sum; the bytes follow it.
+      const auto checked = [&](int column, const std::string& name) {
+        std::vector<std::uint8_t> data = rows_.blob(column + 1);
+        if (static_cast<std::uint64_t>(rows_.integer(column)) !=
+            row_sum(static_cast<std::uint64_t>(key), data.data(), data.size())) {
+          throw InputError(name + " is damaged");
+        }
+        return data;
+      };
+      std::vector<std::uint8_t> published;
+      if (rows_.has(5)) {
+        const std::string name = row_name(database_, "tiles", key);
+        published = tile_row(key, checked(4, name), name).payload.bytes();
       }
       std::vector<VoxelBlock> tile;
-      decode_voxels(tile_of(key), mask, data, source, tile);
+      decode_voxels(tile_of(key), mask, checked(2, source), published, source, tile);
       for (const VoxelBlock& block : tile) blocks[block.key] = block;
     }
   } catch (const DatabaseError& error) {

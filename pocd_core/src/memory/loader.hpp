@@ -32,6 +32,9 @@ Total read_rows(Database& database, Table table,
                 const std::function<void(std::int64_t, std::vector<std::uint8_t>)>& visit,
                 const std::function<void(const std::string&)>& damaged);
 
+/// A row of the tiles. Throws InputError naming `source`.
+MapTile tile_row(std::int64_t key, std::vector<std::uint8_t> data, const std::string& source);
+
 /// Mask and owners of a row of the voxel index.
 std::pair<std::uint8_t, std::vector<std::uint32_t>> index_row(
     const std::vector<std::uint8_t>& bytes, const std::string& source);

@@ -17,6 +17,7 @@ constexpr const char* kTablesSql = R"sql(
   CREATE TABLE state(id INTEGER PRIMARY KEY CHECK(id = 1), sum INTEGER, data BLOB);
   CREATE TABLE parts(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE objects(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
+  CREATE TABLE surfaces(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE free_space(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE regions(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
   CREATE TABLE tiles(key INTEGER PRIMARY KEY, sum INTEGER, data BLOB);
@@ -138,7 +139,7 @@ std::int64_t start_run(Database& database, const ClassMap& classes, const Memory
 
 void end_run(Database& database, std::int64_t run) {
   Statement(database, "UPDATE runs SET ended = 1 WHERE run = ?1").bind(1, run).run();
-  database.execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  database.execute("PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE)");
 }
 
 std::optional<StoredState> read_state(Database& database) {

@@ -14,7 +14,7 @@
 
 namespace pocd::memory {
 
-constexpr int kFileVersion = 1;
+constexpr int kFileVersion = 2;
 constexpr std::int64_t kApplicationId = 0x504F4344;  // "POCD"
 constexpr const char* kFileName = "memory.sqlite";
 
@@ -35,7 +35,8 @@ FileHead prepare(Database& database, const TsdfConfig& map);
 /// Notes a run and the names of classes; its number.
 std::int64_t start_run(Database& database, const ClassMap& classes, const MemoryRun& run,
                        std::uint64_t first_event);
-/// The run has ended in order; the log of changes is taken into the file.
+/// The run has ended in order: the log of changes is taken into the file, which gives up the pages
+/// that it does not use.
 void end_run(Database& database, std::int64_t run);
 /// Nothing when no step was written yet. Throws InputError when it is damaged.
 std::optional<StoredState> read_state(Database& database);

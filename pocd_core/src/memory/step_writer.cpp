@@ -88,7 +88,7 @@ void StepWriter::put_tile(const MemoryStep& step, const TileStep& tile) {
     erase(kVoxelIndex, row);
     return;
   }
-  const VoxelPage page = encode_voxels(tile.mask, &step.blocks[tile.first]);
+  const VoxelPage page = encode_voxels(tile.mask, &step.blocks[tile.first], tile.payload);
   put(kVoxels, row, page.bytes.data(), page.bytes.size());
   SaveArchive index;
   index(page.mask, page.owners);
@@ -169,7 +169,7 @@ void StepWriter::write(const MemoryStep& step) {
     if (piece.bytes.empty()) {
       erase(table, key);
     } else {
-      const std::vector<std::uint8_t> data = compress(piece.bytes, kLevel);
+      const std::vector<std::uint8_t> data = compress(piece.bytes, kLevel, piece.sections);
       put(table, key, data.data(), data.size());
     }
   }

@@ -42,6 +42,7 @@ namespace memory {
 enum Table {
   kParts,
   kObjects,
+  kSurfaces,
   kFreeSpaceTable,
   kRegionsTable,
   kTiles,
@@ -50,7 +51,7 @@ enum Table {
   kTables
 };
 constexpr std::array<const char*, kTables> kTableNames = {
-    "parts", "objects", "free_space", "regions", "tiles", "voxel_index", "voxels"};
+    "parts", "objects", "surfaces", "free_space", "regions", "tiles", "voxel_index", "voxels"};
 static_assert(kPieceKinds == kTiles, "each kind of piece has a table of its number");
 
 /// Of all rows of a table: a row that is missing or of another time is noticed.

@@ -1,12 +1,21 @@
-// Layout, inside one zstd frame, for the n blocks of the mask after each other (512 n voxels):
-//   differences of the distances along x, low bytes, then high bytes
-//   weights, low bytes, then high bytes
-//   u32 number of owners p, p x u32 owners, ascending, then per voxel the index: 0 background, k
+// Layout, inside one zstd frame, for the n blocks of the mask after each other (512 n voxels). Only
+// voxels that are not all 0 are listed, in order. The published tile, where there is one, says most
+// of which they are and of their distances. Numbers are what is left of them, modulo 2^16, zigzag:
+// 0, -1, 1, -2, ... Each line is a section, compressed by itself: what is random in one of them
+// would spoil the code of the others.
+//   u32 number m of voxels that are listed; 512 n bits, bit i % 8 of byte i / 8, of those that are
+//   listed and not observed in the tile, or the other way round
+//   distances less that of the tile, or where it has none that of the voxel before, low bytes
+//   the same, high bytes
+//   weights less that of the voxel before, low bytes
+//   the same, high bytes
+//   u32 number p of owners, p x u32 owners, ascending, then per voxel the index: 0 background, k
 //   owner k-1; absent if p = 0, u8 if p < 256, else u16, low bytes, then high bytes
 #include "voxel_page.hpp"
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 #include <string>
 
 #include "../map/zstd_codec.hpp"
@@ -17,12 +26,38 @@ namespace {
 
 constexpr int kVoxels = VoxelBlock::kVoxels;
 constexpr int kLevel = 1;
-constexpr std::size_t kLargest = 8 * kVoxels * (2 + 2 + 2 + 4) + 4;
+constexpr std::size_t kLargest = 8 * kVoxels * (2 + 2 + 2 + 4) + 8 * kVoxels / 8 + 8;
 
-void put_planes(std::vector<std::uint8_t>& out, const std::vector<std::uint16_t>& values) {
-  for (const std::uint16_t v : values) out.push_back(static_cast<std::uint8_t>(v));
-  for (const std::uint16_t v : values) out.push_back(static_cast<std::uint8_t>(v >> 8));
+std::uint16_t zigzag(std::uint16_t difference) {
+  const auto sign = static_cast<std::uint16_t>(difference >> 15 ? 0xFFFF : 0);
+  return static_cast<std::uint16_t>(difference << 1 ^ sign);
 }
+std::uint16_t unzigzag(unsigned value) {
+  return static_cast<std::uint16_t>(value >> 1 ^ (value & 1 ? 0xFFFF : 0));
+}
+
+/// Collects bytes and where their sections end.
+class Sections {
+ public:
+  explicit Sections(std::size_t size) { raw_.reserve(size); }
+  void byte(unsigned v) { raw_.push_back(static_cast<std::uint8_t>(v)); }
+  void number(std::uint32_t v) {
+    for (int i = 0; i < 4; ++i) byte(v >> (8 * i) & 0xFF);
+  }
+  void end() { ends_.push_back(raw_.size()); }
+  /// Low bytes, then high bytes.
+  void planes(const std::vector<std::uint16_t>& values) {
+    for (const std::uint16_t v : values) byte(v & 0xFF);
+    end();
+    for (const std::uint16_t v : values) byte(v >> 8);
+    end();
+  }
+  std::vector<std::uint8_t> compressed() const { return compress(raw_, kLevel, ends_); }
+
+ private:
+  std::vector<std::uint8_t> raw_;
+  std::vector<std::size_t> ends_;
+};
 
 /// Bounds-checked.
 class Bytes {
@@ -34,6 +69,11 @@ class Bytes {
     at_ += size;
     return bytes_.data() + at_ - size;
   }
+  std::uint32_t number() {
+    std::uint32_t v = 0;
+    std::memcpy(&v, take(4), 4);
+    return v;
+  }
   void finish() const {
     if (at_ != bytes_.size()) throw InputError(source_ + ": bytes after the voxels");
   }
@@ -44,99 +84,155 @@ class Bytes {
   std::size_t at_ = 0;
 };
 
+void put_owners(const std::vector<std::uint32_t>& palette, const std::vector<std::uint32_t>& owners,
+                Sections& out) {
+  out.number(static_cast<std::uint32_t>(palette.size()));
+  for (const std::uint32_t owner : palette) out.number(owner);
+  if (palette.empty()) return;
+  std::vector<std::uint16_t> indices;
+  indices.reserve(owners.size());
+  std::uint32_t last = 0;
+  std::uint16_t index = 0;
+  for (const std::uint32_t owner : owners) {
+    if (owner != last) {
+      last = owner;
+      const auto at = std::lower_bound(palette.begin(), palette.end(), owner);
+      index = owner == 0 ? 0 : static_cast<std::uint16_t>(at - palette.begin() + 1);
+    }
+    indices.push_back(index);
+  }
+  if (palette.size() < 256) {
+    for (const std::uint16_t v : indices) out.byte(v);
+  } else {
+    out.planes(indices);
+  }
+}
+
+/// What the published tile says of the voxels of a page.
+class Guess {
+ public:
+  explicit Guess(const std::vector<std::uint8_t>& payload) {
+    constexpr double kSteps = 127.0;  // as the tile counts distances
+    if (!payload.empty()) tile_ = std::make_unique<DecodedTile>(decode_tile(payload, kSteps));
+  }
+  /// Voxel i of the block in this place.
+  bool observed(int place, int i) const {
+    return tile_ != nullptr && tile_->observed[index(place, i)] != 0;
+  }
+  /// Of one that is observed.
+  std::uint16_t distance(int place, int i) const {
+    const auto step = static_cast<int>(tile_->distance_m[index(place, i)]);
+    return static_cast<std::uint16_t>(step * 32767 / 127);
+  }
+
+ private:
+  static std::size_t index(int place, int i) {
+    const int x = (place & 1) * 8 + (i & 7), y = (place >> 1 & 1) * 8 + (i >> 3 & 7),
+              z = (place >> 2) * 8 + (i >> 6);
+    return static_cast<std::size_t>(x + kTileSide * (y + kTileSide * z));
+  }
+  std::unique_ptr<const DecodedTile> tile_;
+};
+
+/// Calls `visit(place, i, v)` for voxel i of each block of the mask; v counts them.
+template <class Visit>
+void for_each_voxel(std::uint8_t mask, const Visit& visit) {
+  std::size_t v = 0;
+  for (int place = 0; place < 8; ++place) {
+    if (!(mask >> place & 1)) continue;
+    for (int i = 0; i < kVoxels; ++i, ++v) visit(place, i, v);
+  }
+}
+
 }  // namespace
 
-VoxelPage encode_voxels(std::uint8_t mask, const VoxelBlock* blocks) {
-  const auto count = static_cast<std::size_t>(__builtin_popcount(mask));
+VoxelPage encode_voxels(std::uint8_t mask, const VoxelBlock* blocks,
+                        const std::vector<std::uint8_t>& published) {
+  const auto n = static_cast<std::size_t>(__builtin_popcount(mask)) * kVoxels;
+  const Guess guess(published);
   VoxelPage page;
   page.mask = mask;
-  std::vector<std::uint16_t> values(count * kVoxels);
-  std::vector<std::uint8_t> raw;
-  raw.reserve(count * kVoxels * 5 + 64);
-  for (std::size_t b = 0; b < count; ++b) {
-    int before = 0;
-    for (int i = 0; i < kVoxels; ++i) {
-      values[b * kVoxels + i] = static_cast<std::uint16_t>(blocks[b].tsdf[i] - before);
-      before = blocks[b].tsdf[i];
+  std::vector<std::uint8_t> unforeseen(n / 8, 0);
+  std::vector<std::uint16_t> distances, weights;
+  std::vector<std::uint32_t> owners;
+  distances.reserve(n), weights.reserve(n), owners.reserve(n);
+  std::uint16_t distance = 0, weight = 0;
+  for_each_voxel(mask, [&](int place, int i, std::size_t v) {
+    const VoxelBlock& block = blocks[v / kVoxels];
+    const auto tsdf = static_cast<std::uint16_t>(block.tsdf[i]);
+    const std::uint32_t owner = block.owner[i];
+    const bool listed = tsdf != 0 || block.weight[i] != 0 || owner != 0;
+    const bool observed = guess.observed(place, i);
+    if (listed != observed) {
+      unforeseen[v / 8] = static_cast<std::uint8_t>(unforeseen[v / 8] | 1 << (v % 8));
     }
-  }
-  put_planes(raw, values);
-  for (std::size_t b = 0; b < count; ++b) {
-    std::copy(blocks[b].weight.begin(), blocks[b].weight.end(), &values[b * kVoxels]);
-  }
-  put_planes(raw, values);
-  for (std::size_t b = 0; b < count; ++b) {
-    std::uint32_t last = 0;
-    for (const std::uint32_t owner : blocks[b].owner) {
-      if (owner != last && owner != 0) page.owners.push_back(owner);
-      last = owner;
-    }
-  }
+    if (!listed) return;
+    const std::uint16_t expected = observed ? guess.distance(place, i) : distance;
+    distances.push_back(zigzag(static_cast<std::uint16_t>(tsdf - expected)));
+    weights.push_back(zigzag(static_cast<std::uint16_t>(block.weight[i] - weight)));
+    if (owner != 0 && (owners.empty() || owner != owners.back())) page.owners.push_back(owner);
+    owners.push_back(owner);
+    distance = tsdf;
+    weight = block.weight[i];
+  });
   std::sort(page.owners.begin(), page.owners.end());
   page.owners.erase(std::unique(page.owners.begin(), page.owners.end()), page.owners.end());
-  const auto p = static_cast<std::uint32_t>(page.owners.size());
-  const auto put32 = [&raw](std::uint32_t v) {
-    for (int i = 0; i < 4; ++i) raw.push_back(static_cast<std::uint8_t>(v >> (8 * i)));
-  };
-  put32(p);
-  for (const std::uint32_t owner : page.owners) put32(owner);
-  if (p > 0) {
-    std::uint32_t last = 0;
-    std::uint16_t index = 0;
-    for (std::size_t b = 0; b < count; ++b) {
-      for (int i = 0; i < kVoxels; ++i) {
-        const std::uint32_t owner = blocks[b].owner[i];
-        if (owner != last) {
-          last = owner;
-          const auto at = std::lower_bound(page.owners.begin(), page.owners.end(), owner);
-          index = owner == 0 ? 0 : static_cast<std::uint16_t>(at - page.owners.begin() + 1);
-        }
-        values[b * kVoxels + i] = index;
-      }
-    }
-    if (p < 256) {
-      for (const std::uint16_t v : values) raw.push_back(static_cast<std::uint8_t>(v));
-    } else {
-      put_planes(raw, values);
-    }
-  }
-  page.bytes = compress(raw, kLevel);
+  Sections out(n * 5 + n / 8 + 64);
+  out.number(static_cast<std::uint32_t>(distances.size()));
+  for (const std::uint8_t bits : unforeseen) out.byte(bits);
+  out.end();
+  out.planes(distances);
+  out.planes(weights);
+  put_owners(page.owners, owners, out);
+  page.bytes = out.compressed();
   return page;
 }
 
 void decode_voxels(const TileKey& key, std::uint8_t mask, const std::vector<std::uint8_t>& bytes,
-                   const std::string& source, std::vector<VoxelBlock>& out) {
+                   const std::vector<std::uint8_t>& published, const std::string& source,
+                   std::vector<VoxelBlock>& out) {
   const std::vector<std::uint8_t> raw = decompress(bytes.data(), bytes.size(), kLargest, source);
-  const auto count = static_cast<std::size_t>(__builtin_popcount(mask));
-  const std::size_t n = count * kVoxels;
+  const auto n = static_cast<std::size_t>(__builtin_popcount(mask)) * kVoxels;
+  const Guess guess(published);
   Bytes in(raw, source);
-  const std::uint8_t* tsdf = in.take(2 * n);
-  const std::uint8_t* weight = in.take(2 * n);
-  std::uint32_t p = 0;
-  std::memcpy(&p, in.take(4), 4);
+  const std::size_t m = in.number();
+  const std::uint8_t* unforeseen = in.take(n / 8);
+  if (m > n) throw InputError(source + ": lists more voxels than there are");
+  const std::uint8_t* distances = in.take(2 * m);
+  const std::uint8_t* weights = in.take(2 * m);
+  const std::size_t p = in.number();
   if (p > n) throw InputError(source + ": more owners than voxels");
   std::vector<std::uint32_t> owners(p + 1, 0);
-  std::memcpy(owners.data() + 1, in.take(4 * std::size_t{p}), 4 * std::size_t{p});
-  const std::uint8_t* index = p == 0 ? nullptr : in.take(p < 256 ? n : 2 * n);
+  std::memcpy(owners.data() + 1, in.take(4 * p), 4 * p);
+  const std::uint8_t* index = p == 0 ? nullptr : in.take(p < 256 ? m : 2 * m);
   in.finish();
-  std::size_t v = 0;
-  for (int place = 0; place < 8; ++place) {
-    if (!(mask >> place & 1)) continue;
-    VoxelBlock& block = out.emplace_back();
-    block.key = {2 * key.x + (place & 1), 2 * key.y + (place >> 1 & 1), 2 * key.z + (place >> 2)};
-    int before = 0;
-    for (int i = 0; i < kVoxels; ++i, ++v) {
-      const auto difference = static_cast<std::uint16_t>(tsdf[v] | tsdf[n + v] << 8);
-      before = static_cast<std::int16_t>(static_cast<std::uint16_t>(before + difference));
-      block.tsdf[i] = static_cast<std::int16_t>(before);
-      block.weight[i] = static_cast<std::uint16_t>(weight[v] | weight[n + v] << 8);
-      if (p == 0) continue;
-      const std::size_t k =
-          p < 256 ? index[v] : static_cast<std::size_t>(index[v] | index[n + v] << 8);
-      if (k > p) throw InputError(source + ": a voxel has an owner that is not listed");
-      block.owner[i] = owners[k];
+  std::uint16_t distance = 0, weight = 0;
+  std::size_t k = 0;  // of those that are listed
+  const std::size_t first = out.size();
+  for_each_voxel(mask, [&](int place, int i, std::size_t v) {
+    if (i == 0) {
+      out.emplace_back().key = {2 * key.x + (place & 1), 2 * key.y + (place >> 1 & 1),
+                                2 * key.z + (place >> 2)};
     }
-  }
+    const bool observed = guess.observed(place, i);
+    if (observed == ((unforeseen[v / 8] >> (v % 8) & 1) != 0)) return;
+    if (k == m) throw InputError(source + ": lists fewer voxels than it names");
+    VoxelBlock& block = out[first + v / kVoxels];
+    const std::uint16_t expected = observed ? guess.distance(place, i) : distance;
+    distance =
+        static_cast<std::uint16_t>(expected + unzigzag(distances[k] | distances[m + k] << 8));
+    weight = static_cast<std::uint16_t>(weight + unzigzag(weights[k] | weights[m + k] << 8));
+    block.tsdf[i] = static_cast<std::int16_t>(distance);
+    block.weight[i] = weight;
+    if (p > 0) {
+      const std::size_t o =
+          p < 256 ? index[k] : static_cast<std::size_t>(index[k] | index[m + k] << 8);
+      if (o > p) throw InputError(source + ": a voxel has an owner that is not listed");
+      block.owner[i] = owners[o];
+    }
+    ++k;
+  });
+  if (k != m) throw InputError(source + ": lists more voxels than it names");
 }
 
 namespace {

@@ -15,12 +15,17 @@ struct VoxelPage {
   std::vector<std::uint8_t> bytes;
 };
 
-/// `blocks` are those of the mask, in the order of its bits.
-VoxelPage encode_voxels(std::uint8_t mask, const VoxelBlock* blocks);
+/// `blocks` are those of the mask, in the order of its bits. `published` is the payload of the tile
+/// as it is stored beside, empty where nothing is published; any tile will do, that of these voxels
+/// makes the page small.
+VoxelPage encode_voxels(std::uint8_t mask, const VoxelBlock* blocks,
+                        const std::vector<std::uint8_t>& published);
 
-/// Appends the blocks of the tile. Throws InputError naming `source`.
+/// Appends the blocks of the tile. `published` is what they were encoded with. Throws InputError
+/// naming `source`.
 void decode_voxels(const TileKey& key, std::uint8_t mask, const std::vector<std::uint8_t>& bytes,
-                   const std::string& source, std::vector<VoxelBlock>& out);
+                   const std::vector<std::uint8_t>& published, const std::string& source,
+                   std::vector<VoxelBlock>& out);
 
 /// Keys of tiles as row numbers: the 64 tiles of a region follow each other.
 std::int64_t row_of(const TileKey& tile);

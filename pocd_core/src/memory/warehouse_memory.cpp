@@ -11,6 +11,7 @@
 #include "gather.hpp"
 #include "loader.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "schema.hpp"
 #include "step_writer.hpp"
 
@@ -119,6 +120,7 @@ void WarehouseMemory::Impl::note_written(double ms) {
   status.file_bytes = bytes;
   status.written_bytes = writer->written_bytes();
   status.write_ms = ms;
+  status.write_cpu_ms = thread_cpu_ms();  // the thread does nothing else
 }
 
 bool WarehouseMemory::Impl::write_one(const MemoryStep& step) {
@@ -184,8 +186,8 @@ PocdPipeline::Numbers WarehouseMemory::Impl::reserve(const PocdPipeline::Numbers
 void WarehouseMemory::Impl::gather(PocdPipeline& pipeline, const MapPublisher& publisher,
                                    StampNs stamp_ns, bool clean,
                                    std::vector<std::uint8_t> progress) {
-  const auto start = Clock::now();
-  last_step = start;
+  const double cpu_start_ms = thread_cpu_ms();
+  last_step = Clock::now();
   auto step = std::make_unique<MemoryStep>();
   gather_changes(pipeline, publisher, *step);
   step->events = std::move(events);
@@ -198,10 +200,10 @@ void WarehouseMemory::Impl::gather(PocdPipeline& pipeline, const MapPublisher& p
   step->state.next = pipeline.numbers();
   step->state.reserved = reserve(step->state.next);
   step->state.progress = std::move(progress);
-  const double ms = ms_since(start);
+  const double cpu_ms = thread_cpu_ms() - cpu_start_ms;
   hand_over(std::move(step));
   const std::lock_guard<std::mutex> guard(mutex);
-  status.gather_ms = ms;
+  status.gather_cpu_ms += cpu_ms;
 }
 
 WarehouseMemory::WarehouseMemory(const MemoryConfig& config, const TsdfConfig& map)
@@ -246,6 +248,7 @@ void WarehouseMemory::start(PocdPipeline& pipeline, const ClassMap& classes, con
   }
   // From here on what changes is noted; what was restored is on disk already.
   pipeline.map().keep_unsaved();
+  pipeline.note_looks();
   m.thread = std::thread([&m] { m.write_steps(); });
 }
 

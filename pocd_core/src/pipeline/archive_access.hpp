@@ -56,49 +56,11 @@ struct ArchiveAccess {
     a(list, moves);
   }
 
-  /// First all first bytes of a field, then all second ones, and so on: they are alike and
-  /// compress.
-  template <class Archive, class T>
-  static void by_planes(Archive& a, std::vector<Surfel>& surfels, T Surfel::*field) {
-    std::vector<std::uint8_t> plane(surfels.size());
-    for (std::size_t k = 0; k < sizeof(T); ++k) {
-      const auto byte = [&](std::size_t i) {
-        return reinterpret_cast<std::uint8_t*>(&(surfels[i].*field)) + k;
-      };
-      if constexpr (!Archive::kLoads) {
-        for (std::size_t i = 0; i < surfels.size(); ++i) plane[i] = *byte(i);
-      }
-      a.raw(plane.data(), plane.size());
-      if constexpr (Archive::kLoads) {
-        for (std::size_t i = 0; i < surfels.size(); ++i) *byte(i) = plane[i];
-      }
-    }
-  }
-  template <class Archive>
-  static void by_planes(Archive& a, std::vector<Surfel>& surfels) {
-    surfels.resize(a.count(surfels.size()));
-    if (surfels.empty()) return;
-    // All members, as below.
-    [[maybe_unused]] auto& [point, normal, weight, hits, through, is_new, hit_ns] = surfels.front();
-    by_planes(a, surfels, &Surfel::point_W);
-    by_planes(a, surfels, &Surfel::normal_W);
-    by_planes(a, surfels, &Surfel::weight);
-    by_planes(a, surfels, &Surfel::hits);
-    by_planes(a, surfels, &Surfel::seen_through);
-    std::vector<std::uint8_t> arrived;
-    for (const Surfel& surfel : surfels) arrived.push_back(surfel.arrived ? 1 : 0);
-    a.raw(arrived.data(), arrived.size());
-    if constexpr (Archive::kLoads) {
-      for (std::size_t i = 0; i < surfels.size(); ++i) surfels[i].arrived = arrived[i] == 1;
-    }
-    by_planes(a, surfels, &Surfel::last_hit_ns);
-  }
-
   /// The index lists each surfel in its own cell, or in one that it crept out of.
   template <class Archive>
   static void describe(Archive& a, ObjectModel& m) {
     [[maybe_unused]] auto& [spacing_m, inverse_spacing, surfels, index] = m;
-    by_planes(a, surfels);
+    surfels_by_planes(a, surfels);
     std::vector<std::pair<std::int32_t, std::uint64_t>> elsewhere;  // surfel, cell
     if constexpr (!Archive::kLoads) {
       bool any = false;
@@ -134,6 +96,19 @@ struct ArchiveAccess {
   }
 
   using FreeBlock = FreeSpace::Block;
+  /// Differences along x: neighbours were seen empty about as often.
+  static FreeBlock differences(const FreeBlock& block) {
+    FreeBlock out = block;
+    for (std::size_t i = 1; i < block.size(); ++i) {
+      out[i] = static_cast<std::uint8_t>(block[i] - block[i - 1]);
+    }
+    return out;
+  }
+  static void sum_up(FreeBlock& block) {
+    for (std::size_t i = 1; i < block.size(); ++i) {
+      block[i] = static_cast<std::uint8_t>(block[i] + block[i - 1]);
+    }
+  }
   /// Null where nothing was seen.
   static const FreeBlock* free_block(const FreeSpace& space, const BlockKey& key) {
     const auto at = space.blocks_.find(key);
@@ -146,7 +121,7 @@ struct ArchiveAccess {
   }
 
   static StampNs& looked_ns(LookedAt& looked, const BlockKey& region) {
-    [[maybe_unused]] auto& [inverse_m, last_ns, fresh, changed, notes_changes] = looked;
+    [[maybe_unused]] auto& [inverse_m, last_ns, fresh, changed, on, notes_changes] = looked;
     return last_ns[region];
   }
 

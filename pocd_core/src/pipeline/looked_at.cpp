@@ -9,6 +9,7 @@ LookedAt::LookedAt(double voxel_size_m)
           1.0 / (voxel_size_m * (VoxelBlock::kSide << BlockKey::kRegionShift)))) {}
 
 void LookedAt::note(const OrganizedCloud& cloud, StampNs stamp_ns) {
+  if (!on_) return;
   BlockKey last;
   bool any = false;
   // A region spans many pixels, also at a distance.
@@ -33,10 +34,19 @@ void LookedAt::note(const OrganizedCloud& cloud, StampNs stamp_ns) {
   }
 }
 
-std::vector<BlockKey> LookedAt::take() {
-  std::vector<BlockKey> keys(fresh_.begin(), fresh_.end());
+std::vector<RegionLook> LookedAt::take() {
+  std::vector<RegionLook> looks;
+  looks.reserve(fresh_.size());
+  for (const BlockKey& region : fresh_) looks.push_back({region, last_ns_.at(region)});
   fresh_.clear();
-  return keys;
+  return looks;
+}
+
+std::vector<RegionLook> LookedAt::all() const {
+  std::vector<RegionLook> looks;
+  looks.reserve(last_ns_.size());
+  for (const auto& [region, stamp_ns] : last_ns_) looks.push_back({region, stamp_ns});
+  return looks;
 }
 
 std::set<BlockKey> LookedAt::take_changed() {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pocd/map/voxel_block.hpp"
+#include "pocd/pipeline/pocd_pipeline.hpp"
 #include "pocd/segmentation/organized_cloud.hpp"
 
 namespace pocd {
@@ -17,13 +18,17 @@ class LookedAt {
   /// `voxel_size_m`: of the map, > 0.
   explicit LookedAt(double voxel_size_m);
 
+  /// From here on looks are noted.
+  void start() { on_ = true; }
   /// Every region in which the frame has measured a surface was looked at, by a sample of its
-  /// pixels.
+  /// pixels. Nothing before start().
   void note(const OrganizedCloud& cloud, StampNs stamp_ns);
 
   /// Regions that were looked at since the last call, ascending.
-  std::vector<BlockKey> take();
-  /// The same, for who writes them down; all there are at the first call.
+  std::vector<RegionLook> take();
+  /// All there are, ascending.
+  std::vector<RegionLook> all() const;
+  /// Keys of what take() gives, for who writes them down; all there are at the first call.
   std::set<BlockKey> take_changed();
 
  private:
@@ -31,7 +36,7 @@ class LookedAt {
   float inverse_m_;
   std::map<BlockKey, StampNs> last_ns_;
   std::set<BlockKey> fresh_, changed_;
-  bool notes_changes_ = false;
+  bool on_ = false, notes_changes_ = false;
 };
 
 }  // namespace pocd

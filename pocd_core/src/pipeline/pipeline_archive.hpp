@@ -42,7 +42,7 @@ class PipelineArchive {
  private:
   /// Adds the piece unless it is as it was.
   void add(PieceKind kind, std::uint64_t key, std::vector<std::uint8_t> bytes,
-           std::vector<Piece>& out);
+           std::vector<Piece>& out, std::vector<std::size_t> sections = {});
 
   std::map<std::pair<PieceKind, std::uint64_t>, std::uint64_t> hash_of_;  ///< as last given
 };

@@ -1,7 +1,5 @@
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -16,6 +14,7 @@
 #include "operator_acts.hpp"
 #include "pipeline_archive.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd/segmentation/things.hpp"
 
 namespace pocd {
@@ -33,14 +32,9 @@ class StageClock {
   }
 
  private:
-  static double clock_ms(clockid_t clock) {
-    timespec t{};
-    clock_gettime(clock, &t);
-    return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-  }
   static double wall_ms() { return clock_ms(CLOCK_MONOTONIC); }
   /// This thread and the pool's, not the process: that has other work, too.
-  double cpu_ms() const { return clock_ms(CLOCK_THREAD_CPUTIME_ID) + pool_.worker_cpu_ms(); }
+  double cpu_ms() const { return thread_cpu_ms() + pool_.worker_cpu_ms(); }
 
   const ThreadPool& pool_;
   std::vector<StageTiming>& timings_;
@@ -224,7 +218,9 @@ std::vector<ObjectSnapshot> PocdPipeline::objects() const {
 
 std::uint64_t PocdPipeline::object_visits() const { return impl_->tracker.library().visits(); }
 
-std::vector<BlockKey> PocdPipeline::take_looked_at() { return impl_->looked_at.take(); }
+void PocdPipeline::note_looks() { impl_->looked_at.start(); }
+std::vector<RegionLook> PocdPipeline::take_looks() { return impl_->looked_at.take(); }
+std::vector<RegionLook> PocdPipeline::looks() const { return impl_->looked_at.all(); }
 
 WordOutcome PocdPipeline::apply(const OperatorWord& word) {
   Impl& p = *impl_;

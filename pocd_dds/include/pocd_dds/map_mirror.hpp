@@ -30,6 +30,7 @@ struct MirrorOptions {
   std::string security_folder;  ///< identity and permissions (docs/security.md); empty: no security
   std::uint32_t map_id = 0;     ///< the publisher's `node.map_id`
   CatchUp catch_up = CatchUp::kEither;
+  bool looks = false;  ///< also when regions were last looked at: MirrorContents::regions
   /// Called for every event in order, by a thread of its own, with the name of the object's class.
   /// Events from before the mirror joined are not repeated. It may be slow and may throw: the copy
   /// goes on, and the status says so. The mirror's end waits until all that wait were called.
@@ -64,6 +65,14 @@ struct MirrorStatus {
   std::string last_failure;
 };
 
+/// A region of the map, a cube of 64 voxels that begins at `region` * 64 * voxel_size_m, in which a
+/// robot has measured a surface.
+struct MirrorRegion {
+  BlockKey region;
+  StampNs last_looked_ns = 0;  ///< stamp of the last frame that did
+  bool looked_in_run = false;  ///< false: nobody has looked since the publisher was started
+};
+
 struct MirrorContents {
   MirrorStatus status;
   double voxel_size_m = 0.0;
@@ -72,6 +81,8 @@ struct MirrorContents {
   std::map<TileKey, MapTile> tiles;
   std::vector<ObjectSnapshot> objects;         ///< by id
   std::map<ClassId, std::string> class_names;  ///< of the objects
+  /// By z, y, x; with MirrorOptions::looks, of a publisher with a memory, up to 5 s late.
+  std::vector<MirrorRegion> regions;
 };
 
 /// Follows the deltas with a thread of its own, from construction on. When it joins late, has

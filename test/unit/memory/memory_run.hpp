@@ -92,8 +92,12 @@ class MemoryRunner {
   std::uint64_t next() const { return next_; }
   bool process(const std::vector<Frame>& frames) {
     if (next_ == frames.size()) return false;
-    const FrameResult result = pipeline_.process_frame(frames[next_++]);
-    stamp_ns_ = frames[next_ - 1].stamp_ns;
+    process(frames[next_++]);
+    return true;
+  }
+  void process(const Frame& frame) {
+    const FrameResult result = pipeline_.process_frame(frame);
+    stamp_ns_ = frame.stamp_ns;
     events_.insert(events_.end(), result.events.begin(), result.events.end());
     if (memory_) memory_->add(result);
     if (const auto word = says ? says(next_, pipeline_) : std::nullopt) {
@@ -102,7 +106,6 @@ class MemoryRunner {
       events_.insert(events_.end(), outcome.result.events.begin(), outcome.result.events.end());
       if (memory_) memory_->add(outcome.result);
     }
-    return true;
   }
   /// What an operator says after so many frames.
   std::function<std::optional<OperatorWord>(std::uint64_t frames, const PocdPipeline&)> says;

@@ -1,6 +1,9 @@
 // Voxels of a tile to bytes and back, and the row that they are in.
 #include <gtest/gtest.h>
 
+#include <array>
+
+#include "map/tile_codec.hpp"
 #include "memory/voxel_page.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/common/random.hpp"
@@ -16,21 +19,37 @@ std::vector<VoxelBlock> random_blocks(Random& random, std::uint8_t mask, std::ui
       block.weight[i] = static_cast<std::uint16_t>(random.below(1001));
       const auto owner = static_cast<std::uint32_t>(random.below(owners + 1));
       block.owner[i] = owner == 0 ? 0 : owner * 7919u;
+      if (random.below(3) == 0) block.tsdf[i] = 0, block.weight[i] = 0, block.owner[i] = 0;
     }
   }
   return blocks;
 }
 
+/// As it is published.
+std::vector<std::uint8_t> tile_of_blocks(std::uint8_t mask, const std::vector<VoxelBlock>& blocks) {
+  std::array<const VoxelBlock*, 8> places{};
+  std::size_t b = 0;
+  for (std::size_t place = 0; place < 8; ++place) {
+    if (mask >> place & 1) places[place] = &blocks[b++];
+  }
+  return encode_tile(places, 500);
+}
+
 TEST(VoxelPage, GivesBackEveryVoxel) {
   Random random(1);
   for (const std::uint32_t owners : {0u, 1u, 3u, 255u, 256u, 3000u}) {
-    for (int trial = 0; trial < 8; ++trial) {
+    for (int trial = 0; trial < 9; ++trial) {
       const auto mask = static_cast<std::uint8_t>(1 + random.below(255));
       const std::vector<VoxelBlock> blocks = random_blocks(random, mask, owners);
-      const VoxelPage page = encode_voxels(mask, blocks.data());
+      // With the tile of these voxels, of others, and with none.
+      const std::vector<std::uint8_t> published =
+          trial % 3 == 0   ? std::vector<std::uint8_t>{}
+          : trial % 3 == 1 ? tile_of_blocks(mask, blocks)
+                           : tile_of_blocks(0x81, random_blocks(random, 0x81, 2));
+      const VoxelPage page = encode_voxels(mask, blocks.data(), published);
       std::vector<VoxelBlock> back;
       const TileKey key{-3, 5, 0};
-      decode_voxels(key, mask, page.bytes, "test", back);
+      decode_voxels(key, mask, page.bytes, published, "test", back);
       ASSERT_EQ(back.size(), blocks.size());
       for (std::size_t b = 0; b < back.size(); ++b) {
         EXPECT_EQ(back[b].tsdf, blocks[b].tsdf);
@@ -47,14 +66,15 @@ TEST(VoxelPage, GivesBackEveryVoxel) {
 TEST(VoxelPage, DamagedBytesAreRefused) {
   Random random(2);
   const std::vector<VoxelBlock> blocks = random_blocks(random, 0x0F, 4);
-  const VoxelPage page = encode_voxels(0x0F, blocks.data());
+  const std::vector<std::uint8_t> published = tile_of_blocks(0x0F, blocks);
+  const VoxelPage page = encode_voxels(0x0F, blocks.data(), published);
   std::vector<VoxelBlock> back;
   for (int trial = 0; trial < 500; ++trial) {
     std::vector<std::uint8_t> bytes = page.bytes;
     bytes.resize(random.below(bytes.size()));
-    EXPECT_THROW(decode_voxels({0, 0, 0}, 0x0F, bytes, "test", back), InputError);
+    EXPECT_THROW(decode_voxels({0, 0, 0}, 0x0F, bytes, published, "test", back), InputError);
   }
-  EXPECT_THROW(decode_voxels({0, 0, 0}, 0x1F, page.bytes, "test", back), InputError);
+  EXPECT_THROW(decode_voxels({0, 0, 0}, 0x1F, page.bytes, published, "test", back), InputError);
 }
 
 TEST(VoxelPage, RowsNameTilesAndThoseOfARegionFollowEachOther) {

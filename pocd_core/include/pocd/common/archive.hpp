@@ -51,10 +51,15 @@ class SaveArchive {
     raw(&n, sizeof n);
     return n;
   }
+  /// What follows is unlike what came before: who compresses it does well to start anew here.
+  void section() { sections_.push_back(bytes_.size()); }
   std::vector<std::uint8_t> take() { return std::move(bytes_); }
+  /// Where sections begin.
+  std::vector<std::size_t> take_sections() { return std::move(sections_); }
 
  private:
   std::vector<std::uint8_t> bytes_;
+  std::vector<std::size_t> sections_;
 };
 
 /// Reads what SaveArchive wrote. Every read is checked against the end; memory is bounded by the
@@ -81,6 +86,7 @@ class LoadArchive {
     std::memcpy(to, at_, size);
     at_ += size;
   }
+  void section() {}
   /// A number of elements of which each takes at least one byte.
   std::uint32_t count(std::size_t /*size*/) {
     std::uint32_t n = 0;

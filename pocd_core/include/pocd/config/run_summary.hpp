@@ -25,6 +25,8 @@ struct RunSummary {
   std::uint64_t map_memory_bytes = 0, map_blocks_on_disk = 0, map_evictions = 0, map_returns = 0;
   std::uint64_t map_write_failures = 0, map_blocks_lost = 0, map_frames_over_budget = 0;
   std::string map_digest;
+  std::uint64_t memory_steps = 0, memory_written_bytes = 0, memory_file_bytes = 0;
+  double memory_copy_cpu_ms = 0.0, memory_write_cpu_ms = 0.0;
   double seconds = 0.0;
   PipelineConfig config;
 
@@ -56,6 +58,14 @@ struct RunSummary {
     visit("map_frames_over_budget", map_frames_over_budget, any,
           "Frames that needed more than the memory budget at once.");
     visit("map_digest", map_digest, "Digest of the published map at the end.");
+    visit("memory_steps", memory_steps, any, "Steps written to the memory; 0 without one.");
+    visit("memory_written_bytes", memory_written_bytes, any, "Rows of all steps [bytes].");
+    visit("memory_file_bytes", memory_file_bytes, any,
+          "The file after the last step, with its log of changes [bytes].");
+    visit("memory_copy_cpu_ms", memory_copy_cpu_ms, any,
+          "CPU time for copying what had changed, on the pipeline's thread [ms].");
+    visit("memory_write_cpu_ms", memory_write_cpu_ms, any,
+          "CPU time for compressing and writing it, on a thread of its own [ms].");
     visit("seconds", seconds, any, "Wall time of reading and processing [s].");
     visit.group("config", config, "The effective configuration.");
   }

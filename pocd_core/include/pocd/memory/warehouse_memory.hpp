@@ -33,7 +33,8 @@ struct MemoryStatus {
   std::uint64_t file_bytes = 0;      ///< database and its log of changes
   std::uint64_t written_bytes = 0;   ///< handed to the database: rows, before its own pages
   double write_ms = 0.0;             ///< the last step, on the writer's thread
-  double gather_ms = 0.0;            ///< the last step, on the pipeline's thread
+  /// CPU time of all steps [ms]: copying on the pipeline's thread, writing on the writer's.
+  double gather_cpu_ms = 0.0, write_cpu_ms = 0.0;
 };
 
 /// One folder, one process at a time. The thread of the pipeline gathers what has changed; a thread
@@ -68,7 +69,8 @@ class WarehouseMemory {
   /// Puts what is kept into a pipeline and a publisher that know nothing yet. Voxels follow when
   /// they are needed. Throws InputError, naming what is damaged.
   void restore(PocdPipeline& pipeline, MapPublisher& publisher);
-  /// Starts to write. Names of classes are kept for who reads the log.
+  /// Starts to write, and to note when regions are looked at. Names of classes are kept for who
+  /// reads the log.
   void start(PocdPipeline& pipeline, const ClassMap& classes, const MemoryRun& run);
 
   // The pipeline's thread:

@@ -13,6 +13,12 @@
 
 namespace pocd {
 
+/// When a surface in a region of the map was last measured.
+struct RegionLook {
+  BlockKey region;       ///< block key >> BlockKey::kRegionShift
+  StampNs stamp_ns = 0;  ///< of the frame
+};
+
 /// Owns the object library and the map. Not thread-safe; it uses `config.threads` threads inside
 /// and gives the same bits for every number of them.
 class PocdPipeline {
@@ -34,9 +40,15 @@ class PocdPipeline {
   /// the same of the map.
   std::uint64_t object_visits() const;
 
-  /// Regions of the map in which a surface was measured since the last call, ascending. Without
-  /// those of before a restore().
-  std::vector<BlockKey> take_looked_at();
+  /// From here on it is noted when regions of the map are looked at; without this, frames cost
+  /// nothing for it.
+  void note_looks();
+  /// Regions in which a surface was measured since the last call, ascending. Without those of
+  /// before a restore().
+  std::vector<RegionLook> take_looks();
+  /// The last look at each region there ever was one at, ascending; those of before a restore(),
+  /// too.
+  std::vector<RegionLook> looks() const;
 
   /// Does what an operator says, between two frames; its events have the stamp of the newest frame.
   /// A word that cannot be followed changes nothing, and the outcome says why.
