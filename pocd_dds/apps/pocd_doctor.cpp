@@ -140,7 +140,9 @@ Findings check_bus(const DoctorOptions& options, NodeFile config, bool multicast
   look();
   std::string names;
   for (const auto& [key, name] : picture.participants()) {
-    if (name != bus.name) names += (names.empty() ? "" : ", ") + name;
+    if (name == bus.name) continue;
+    // Cyclone DDS gives its participants no name.
+    names += (names.empty() ? "" : ", ") + (name.empty() ? "one without a name" : name);
   }
   const std::string domain = "domain " + std::to_string(bus.domain);
   if (names.empty()) {
@@ -155,8 +157,8 @@ Findings check_bus(const DoctorOptions& options, NodeFile config, bool multicast
   } else if (!multicast) {
     findings.push_back({Severity::kError, domain,
                         "participants: " + names +
-                            ", found by unicast: without multicast they do "
-                            "not find each other",
+                            ", found by unicast: without multicast, those that ask nobody by "
+                            "unicast do not find each other",
                         "see multicast above"});
   } else {
     findings.push_back({Severity::kNote, domain, "participants: " + names, ""});

@@ -146,6 +146,19 @@ TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
   }
 }
 
+// Such as those of Cyclone DDS.
+TEST(Doctor, ParticipantsWithoutANameAreThere) {
+  const TestDomain domain;
+  const Machine machine;
+  const dds::Participant nameless({domain.number(), "", ""});
+  CommandResult result;
+  EXPECT_TRUE(eventually([&] {
+    result = run_command(machine.command(domain, {"--listen", "1"}));
+    return result.out.find("participants: one without a name") != std::string::npos;
+  })) << result.out;
+  EXPECT_EQ(result.out.find("nobody else is there"), std::string::npos) << result.out;
+}
+
 TEST(Doctor, SuggestsAConfigurationThatFits) {
   const TestDomain domain;
   const auto bus = test_participant(domain);

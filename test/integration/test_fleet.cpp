@@ -122,6 +122,29 @@ TEST(Fleet, ARobotThatFallsSilentIsSaidToBe) {
   })) << "and it is over when images come again";
 }
 
+// What is asked for reliably comes again when the network loses it; who offers less is named.
+TEST(Fleet, SmallInputsCanBeAskedForReliably) {
+  for (const bool reliably : {false, true}) {
+    const TestDomain domain;
+    const auto bus = test_participant(domain);
+    HealthWatch health(bus);
+    dds::Writer<sensor_msgs::msg::ImagePubSubType> depth(
+        bus, dds::topics::kDepth, "rt/robot1/depth/image_raw", dds::topics::best_effort(5));
+    dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info(
+        bus, dds::topics::kCameraInfo, "rt/robot1/depth/camera_info", dds::topics::best_effort(5));
+    TransformSender tf(bus, dds::topics::kTf);  // reliable
+    Process node(fleet_command(domain, {"--set", std::string("node.reliable_tf_and_info=") +
+                                                     (reliably ? "true" : "false")}));
+    ASSERT_TRUE(eventually([&] { return depth.matched() > 0 && tf.matched(); })) << node.err();
+    EXPECT_TRUE(eventually([&] {
+      const bool refused = health.problem("rt/robot1/depth/camera_info", "incompatible_qos") == 1;
+      return reliably ? refused && info.matched() == 0 : info.matched() > 0;
+    })) << reliably
+        << node.err();
+    EXPECT_EQ(health.problem("rt/robot1/depth/image_raw", "incompatible_qos"), 0u);
+  }
+}
+
 // Nothing ever comes on a segmentation topic that is announced and required.
 TEST(Fleet, ASilentStreamHoldsNobodyForEver) {
   const TestDomain domain;
