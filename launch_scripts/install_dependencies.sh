@@ -21,7 +21,7 @@ packages=(
   nlohmann-json3-dev libjs-three
   # tests and benchmarks
   libgtest-dev libbenchmark-dev iproute2 iptables openssl
-  cyclonedds-dev cyclonedds-tools tshark
+  cyclonedds-dev cyclonedds-tools tshark python3-rosidl python3-empy
 )
 
 if [[ "${1:-}" == "--list" ]]; then

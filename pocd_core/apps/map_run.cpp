@@ -3,11 +3,13 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <ostream>
 
 #include "pocd/common/check.hpp"
 #include "pocd/common/cpu_time.hpp"
 #include "pocd/config/config_io.hpp"
+#include "pocd/input/message_checks.hpp"
 #include "pocd/input/pose_quaternion.hpp"
 #include "pocd/map/birdseye.hpp"
 #include "pocd/map/map_delta.hpp"
@@ -86,6 +88,45 @@ void note(const MapProgress& progress, const DatasetReader& reader, RunSummary& 
   summary.removed = progress.removed;
 }
 
+/// Ids that are no class, in the masks of data sets that are no messages: those are looked at where
+/// they become frames.
+class UnlistedIds {
+ public:
+  explicit UnlistedIds(const ClassMap& classes) : table_(classes) {}
+
+  void look(const cv::Mat& labels) {
+    pixels_ += labels.total();
+    for (int row = 0; row < labels.rows; ++row) {
+      const auto* in = labels.ptr<std::uint16_t>(row);
+      for (int col = 0; col < labels.cols; ++col) {
+        if (!table_.known(in[col])) ++found_[table_.class_of(in[col])];
+      }
+    }
+  }
+  /// "" when there are none.
+  std::string text() const {
+    constexpr std::size_t kMost = 5;
+    std::string ids;
+    std::uint64_t pixels = 0;
+    std::size_t named = 0;
+    for (const auto& [id, count] : found_) {
+      pixels += count;
+      if (++named <= kMost) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    }
+    if (ids.empty()) return "";
+    char share[16];
+    std::snprintf(share, sizeof share, "%.2g",
+                  100.0 * static_cast<double>(pixels) / static_cast<double>(pixels_));
+    return "unlisted_class: ids that are no class of classes.list and so background: " + ids +
+           (named > kMost ? ", ..." : "") + "; " + share + " % of the pixels";
+  }
+
+ private:
+  LabelTable table_;
+  std::map<int, std::uint64_t> found_;
+  std::uint64_t pixels_ = 0;
+};
+
 void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory& memory,
                  RunSummary& summary, std::ostream& log) {
   std::unique_ptr<DatasetReader> reader = open_dataset(options.dataset);
@@ -102,6 +143,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
   std::uint64_t already = progress_made.read;  // frames that are in the memory
   memory.repeat_events(events, options.config.classes);
   StampNs stamp_ns = 0;
+  UnlistedIds unlisted(options.config.classes);
   const auto report = [&](const std::string& line) {
     progress.clear();
     log << line << '\n';
@@ -127,6 +169,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
       report("skipped: " + reader->problems()[reported]);
     }
     if (!frame) break;
+    if (options.dataset.format != "mcap") unlisted.look(frame->labels);
     stamp_ns = frame->stamp_ns;
     if (already > 0) {
       --already;
@@ -159,6 +202,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
     progress.update(summary);
   }
   note(progress_made, *reader, summary);
+  if (!unlisted.text().empty()) report(unlisted.text());
   events.close();
   timing.close();
   memory.finish(progress_made, stamp_ns);

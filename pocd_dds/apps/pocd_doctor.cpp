@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -110,7 +111,8 @@ bool suggest(const DoctorOptions& options) {
 }
 
 /// Listens as a node would, beside a participant that looks at who and what is there.
-Findings check_bus(const DoctorOptions& options, NodeFile config) {
+/// `multicast`: it works on some interface.
+Findings check_bus(const DoctorOptions& options, NodeFile config, bool multicast) {
   Findings findings;
   BusWatch watch, intake_watch;
   BusOptions bus = options.bus;
@@ -138,13 +140,26 @@ Findings check_bus(const DoctorOptions& options, NodeFile config) {
   look();
   std::string names;
   for (const auto& [key, name] : picture.participants()) {
-    if (name != bus.name) names += (names.empty() ? "" : ", ") + name;
+    if (name == bus.name) continue;
+    // Cyclone DDS gives its participants no name.
+    names += (names.empty() ? "" : ", ") + (name.empty() ? "one without a name" : name);
   }
   const std::string domain = "domain " + std::to_string(bus.domain);
   if (names.empty()) {
-    findings.push_back({Severity::kError, domain, "nobody else is there",
-                        "check --domain and ROS_DOMAIN_ID on both sides, and that multicast works; "
-                        "containers need one /dev/shm (--ipc host)"});
+    findings.push_back(
+        {Severity::kError, domain,
+         multicast
+             ? "nobody else is there"
+             : "nobody else is there: asked by unicast on this host, as multicast does not work",
+         "check --domain and ROS_DOMAIN_ID on both sides" +
+             std::string(multicast ? ", and that multicast works between hosts" : "") +
+             "; containers need one /dev/shm (--ipc host)"});
+  } else if (!multicast) {
+    findings.push_back({Severity::kError, domain,
+                        "participants: " + names +
+                            ", found by unicast: without multicast, those that ask nobody by "
+                            "unicast do not find each other",
+                        "see multicast above"});
   } else {
     findings.push_back({Severity::kNote, domain, "participants: " + names, ""});
   }
@@ -164,6 +179,7 @@ int main(int argc, char** argv) {
       "pocd_doctor");
   DoctorOptions options;
   options.bus.name = "pocd_doctor";
+  options.bus.ask_this_host = true;
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--config", options.files, "Configuration file of the node; repeat it to overlay")
       ->allow_extra_args(false);
@@ -202,8 +218,12 @@ int main(int argc, char** argv) {
     add(findings, check_network_settings(options.proc));
     add(findings, check_shared_memory(options.shared_memory));
     add(findings, check_environment(std::filesystem::current_path()));
+    const std::map<std::string, std::string> multicast = multicast_by_interface();
+    add(findings, check_multicast(multicast));
     try {
-      add(findings, check_bus(options, config));
+      const bool works = std::any_of(multicast.begin(), multicast.end(),
+                                     [](const auto& entry) { return entry.second.empty(); });
+      add(findings, check_bus(options, config, works));
     } catch (const pocd::InputError& error) {
       findings.push_back({Severity::kError, "bus", error.what(), "see docs/topics_and_qos.md"});
     }

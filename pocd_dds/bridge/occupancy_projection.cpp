@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+
+#include "pocd/common/check.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -12,6 +15,24 @@ namespace {
 constexpr double kFloorBelowBandM = 0.3;
 
 }  // namespace
+
+CellRectangle cells_around(double min_x_m, double min_y_m, double max_x_m, double max_y_m,
+                           double cell_m) {
+  constexpr double kRounding = 1e-6;  // of a cell
+  const double x_low = std::floor(min_x_m / cell_m + kRounding);
+  const double y_low = std::floor(min_y_m / cell_m + kRounding);
+  const double columns = std::ceil(max_x_m / cell_m - kRounding) - x_low;
+  const double rows = std::ceil(max_y_m / cell_m - kRounding) - y_low;
+  if (columns * rows > static_cast<double>(OccupancyProjection::kMostCells)) {
+    throw InputError("node.outputs.occupancy_extent: more than " +
+                     std::to_string(OccupancyProjection::kMostCells) + " cells");
+  }
+  return {static_cast<std::int32_t>(x_low),
+          static_cast<std::int32_t>(y_low),
+          static_cast<std::uint32_t>(columns),
+          static_cast<std::uint32_t>(rows),
+          {}};
+}
 
 OccupancyProjection::Cells OccupancyProjection::project(const MapTile& tile) const {
   Cells cells;
@@ -89,63 +110,69 @@ bool OccupancyProjection::grow() {
   return true;
 }
 
-void OccupancyProjection::paste(const Tower& tower, const Cells& cells) {
-  for (int y = 0; y < kTileSide; ++y) {
-    const std::size_t row = static_cast<std::size_t>(tower.second - low_.second) * kTileSide + y;
-    const std::size_t start =
-        row * grid_.width + static_cast<std::size_t>(tower.first - low_.first) * kTileSide;
-    std::copy_n(cells.begin() + y * kTileSide, kTileSide, grid_.cells.begin() + start);
+void OccupancyProjection::paste(const Tower& tower, const Cells& cells, Span& changed) {
+  const std::int64_t x0 = std::int64_t{tower.first} * kTileSide - grid_.x;
+  const std::int64_t y0 = std::int64_t{tower.second} * kTileSide - grid_.y;
+  for (int cell = 0; cell < kTileSide * kTileSide; ++cell) {
+    const std::int64_t x = x0 + cell % kTileSide, y = y0 + cell / kTileSide;
+    if (x < 0 || y < 0 || x >= grid_.width || y >= grid_.height) {
+      cut_ = cut_ || cells[cell] != kCellUnknown;
+      continue;
+    }
+    std::int8_t& value = grid_.cells[static_cast<std::size_t>(y * grid_.width + x)];
+    if (value == cells[cell]) continue;
+    value = cells[cell];
+    changed.x_low = std::min(changed.x_low, x), changed.x_high = std::max(changed.x_high, x);
+    changed.y_low = std::min(changed.y_low, y), changed.y_high = std::max(changed.y_high, y);
   }
+}
+
+bool OccupancyProjection::begin_grid() {
+  const bool fixed = options_.extent.width > 0;
+  if (fixed ? grid_.width > 0 : !grow()) return false;
+  CellRectangle grid = options_.extent;
+  if (!fixed) {
+    const std::int64_t columns = (std::int64_t{high_.first} - low_.first + 1) * kTileSide;
+    const std::int64_t rows = (std::int64_t{high_.second} - low_.second + 1) * kTileSide;
+    too_large_ = columns > kMostCells || rows > kMostCells || columns * rows > kMostCells;
+    if (too_large_) {
+      grid_ = {};
+      return true;
+    }
+    grid = {low_.first * kTileSide,
+            low_.second * kTileSide,
+            static_cast<std::uint32_t>(columns),
+            static_cast<std::uint32_t>(rows),
+            {}};
+  }
+  grid_ = std::move(grid);
+  grid_.cells.assign(std::size_t{grid_.width} * grid_.height, kCellUnknown);
+  return true;
 }
 
 bool OccupancyProjection::update() {
   changed_rectangle_.reset();
-  if (grow()) {
-    dirty_.clear();
-    const std::int64_t columns = (std::int64_t{high_.first} - low_.first + 1) * kTileSide;
-    const std::int64_t rows = (std::int64_t{high_.second} - low_.second + 1) * kTileSide;
-    too_large_ = columns > kMostCells || rows > kMostCells || columns * rows > kMostCells;
-    grid_ = {};
-    if (too_large_) return true;
-    grid_.x = low_.first * kTileSide;
-    grid_.y = low_.second * kTileSide;
-    grid_.width = static_cast<std::uint32_t>(columns);
-    grid_.height = static_cast<std::uint32_t>(rows);
-    grid_.cells.assign(static_cast<std::size_t>(columns * rows), kCellUnknown);
-    for (const auto& [tower, layers] : towers_) paste(tower, top_view(tower));
-    return true;
-  }
+  const bool anew = begin_grid();
   if (too_large_) {
     dirty_.clear();
-    return false;
+    return anew;
   }
-  const auto at = [&](std::int64_t x, std::int64_t y) -> std::int8_t& {
-    return grid_.cells[static_cast<std::size_t>(y * grid_.width + x)];
-  };
-  std::int64_t x_low = grid_.width, y_low = grid_.height, x_high = -1, y_high = -1;
-  for (const Tower& tower : dirty_) {
-    const Cells cells = top_view(tower);
-    for (int cell = 0; cell < kTileSide * kTileSide; ++cell) {
-      const std::int64_t x =
-          (std::int64_t{tower.first} - low_.first) * kTileSide + cell % kTileSide;
-      const std::int64_t y =
-          (std::int64_t{tower.second} - low_.second) * kTileSide + cell / kTileSide;
-      if (at(x, y) == cells[cell]) continue;
-      at(x, y) = cells[cell];
-      x_low = std::min(x_low, x), x_high = std::max(x_high, x);
-      y_low = std::min(y_low, y), y_high = std::max(y_high, y);
-    }
+  Span span{grid_.width, grid_.height, -1, -1};
+  if (anew) {
+    for (const auto& [tower, layers] : towers_) paste(tower, top_view(tower), span);
+  } else {
+    for (const Tower& tower : dirty_) paste(tower, top_view(tower), span);
   }
   dirty_.clear();
-  if (x_high < 0) return false;
-  CellRectangle changed{static_cast<std::int32_t>(x_low),
-                        static_cast<std::int32_t>(y_low),
-                        static_cast<std::uint32_t>(x_high - x_low + 1),
-                        static_cast<std::uint32_t>(y_high - y_low + 1),
+  if (anew || span.x_high < 0) return anew;
+  CellRectangle changed{static_cast<std::int32_t>(span.x_low),
+                        static_cast<std::int32_t>(span.y_low),
+                        static_cast<std::uint32_t>(span.x_high - span.x_low + 1),
+                        static_cast<std::uint32_t>(span.y_high - span.y_low + 1),
                         {}};
-  for (std::int64_t y = y_low; y <= y_high; ++y) {
+  for (std::int64_t y = span.y_low; y <= span.y_high; ++y) {
     const auto row = grid_.cells.begin() + y * grid_.width;
-    changed.cells.insert(changed.cells.end(), row + x_low, row + x_high + 1);
+    changed.cells.insert(changed.cells.end(), row + span.x_low, row + span.x_high + 1);
   }
   changed_rectangle_ = std::move(changed);
   return false;

@@ -17,6 +17,13 @@ namespace pocd::dds {
 /// Values of a cell.
 constexpr std::int8_t kCellUnknown = -1, kCellFree = 0, kCellOccupied = 100;
 
+/// Cells [x, x + width) x [y, y + height), row-major, x fastest.
+struct CellRectangle {
+  std::int32_t x = 0, y = 0;
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::int8_t> cells;
+};
+
 struct OccupancyOptions {
   double voxel_size_m = 0.05;
   double truncation_m = 0.2;
@@ -25,19 +32,21 @@ struct OccupancyOptions {
   /// Value of what nobody has looked at for long; kAsItWas: as if somebody had.
   int not_looked_at = kCellUnknown;
   static constexpr int kAsItWas = -2;
+  /// What the grid shows (its cells are not used); width 0: what the map covers.
+  CellRectangle extent = {};
 };
 
-/// Cells [x, x + width) x [y, y + height), row-major, x fastest.
-struct CellRectangle {
-  std::int32_t x = 0, y = 0;
-  std::uint32_t width = 0, height = 0;
-  std::vector<std::int8_t> cells;
-};
+/// The smallest rectangle of cells around one in metres: edges that lie on an edge of cells, but
+/// for rounding, take no further cell. Throws InputError for one of more cells than a grid may
+/// have.
+CellRectangle cells_around(double min_x_m, double min_y_m, double max_x_m, double max_y_m,
+                           double cell_m);
 
 /// One cell per voxel column. Occupied: a surface within the band. Free: within the band free space
-/// was seen, or a floor not far below it, and no surface. Unknown: the rest. The grid grows with
-/// the map and does not shrink, so a cell keeps its place for as long as the size stays; but one
-/// that became too large begins anew around what there is. Not thread-safe.
+/// was seen, or a floor not far below it, and no surface. Unknown: the rest. Without a fixed extent
+/// the grid grows with the map and does not shrink, so a cell keeps its place for as long as the
+/// size stays; but one that became too large begins anew around what there is. With one, it has its
+/// size from the first update() on, and what lies outside is left out. Not thread-safe.
 class OccupancyProjection {
  public:
   /// A grid of more cells is no picture any more, and a mistaken far tile must not eat all memory.
@@ -60,6 +69,8 @@ class OccupancyProjection {
   /// when it would be too large.
   const CellRectangle& grid() const { return grid_; }
   bool too_large() const { return too_large_; }
+  /// Part of the map lies outside of the fixed extent.
+  bool cut() const { return cut_; }
 
  private:
   using Tower = std::pair<std::int32_t, std::int32_t>;  // x, y of the tiles above one another
@@ -73,7 +84,12 @@ class OccupancyProjection {
   Cells project(const MapTile& tile) const;
   Cells top_view(const Tower& tower) const;
   bool grow();
-  void paste(const Tower& tower, const Cells& cells);
+  /// Puts the tower's cells into the grid, and returns the rectangle around those that changed.
+  struct Span {
+    std::int64_t x_low, y_low, x_high, y_high;
+  };
+  void paste(const Tower& tower, const Cells& cells, Span& changed);
+  bool begin_grid();
 
   const OccupancyOptions options_;
   std::map<Tower, std::map<std::int32_t, Layer>> towers_;  // by z
@@ -83,6 +99,7 @@ class OccupancyProjection {
   CellRectangle grid_;
   std::optional<CellRectangle> changed_rectangle_;
   bool too_large_ = false;
+  bool cut_ = false;
 };
 
 }  // namespace pocd::dds

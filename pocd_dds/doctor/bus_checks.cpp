@@ -75,7 +75,8 @@ void check_writers(const std::vector<BusEndpoint>& writers, const std::string& t
                           "announce it as ROS 2 does"});
     } else if (reliable && !writer.reliable) {
       findings.push_back({Severity::kError, topic, "is offered best effort, asked for reliable",
-                          "make the sender reliable, or do without node.lossless"});
+                          "make the sender reliable, or do without node.lossless and "
+                          "node.reliable_tf_and_info"});
     } else if (spec.delivery.transient_local && !writer.transient_local) {
       findings.push_back({Severity::kError, topic, "is offered volatile, asked for transient local",
                           "latch it (transient local), as ROS 2 does with tf_static"});
@@ -92,7 +93,8 @@ void check_robot(const BusPicture& bus, const RobotConfig& robot, const NodeConf
       findings.push_back({expected.if_missing, topic, "nobody announces it: " + expected.lacking,
                           advice_for(bus, topic, expected.stream)});
     }
-    check_writers(writers, topic, spec_of(expected.stream, topic), node.lossless, findings);
+    const TopicSpec spec = spec_of(expected.stream, topic);
+    check_writers(writers, topic, spec, input_delivery(spec, node).reliable, findings);
   }
   const std::string odometry = topic_of(node, robot, InputStream::kOdometry);
   const std::string tf = topic_of(node, robot, InputStream::kTf);
@@ -102,8 +104,9 @@ void check_robot(const BusPicture& bus, const RobotConfig& robot, const NodeConf
                         "nobody announces it, nor " + tf + ": " + robot.name + " has no pose",
                         "start odometry or localisation, or correct the names in `node.topics`"});
   }
-  check_writers(poses, odometry, topics::kOdometry, node.lossless, findings);
-  check_writers(transforms, tf, topics::kTf, false, findings);
+  check_writers(poses, odometry, topics::kOdometry,
+                input_delivery(topics::kOdometry, node).reliable, findings);
+  check_writers(transforms, tf, topics::kTf, input_delivery(topics::kTf, node).reliable, findings);
 }
 
 /// Robots whose topics lack the prefix of ROS 2.

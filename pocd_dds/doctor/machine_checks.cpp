@@ -1,12 +1,20 @@
 #include "pocd_dds/doctor/machine_checks.hpp"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <poll.h>
 #include <sys/file.h>
+#include <sys/socket.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <optional>
 #include <string>
@@ -25,6 +33,42 @@ std::optional<std::uint64_t> number_in(const std::filesystem::path& file) {
   std::uint64_t value = 0;
   if (!(in >> value)) return std::nullopt;
   return value;
+}
+
+/// "" when a packet to RTPS's multicast group, sent through the interface with this address, comes
+/// back to this machine; else why not.
+std::string multicast_problem(const in_addr& interface) {
+  constexpr int kWaitMs = 300;
+  struct Socket {
+    int descriptor = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    ~Socket() {
+      if (descriptor >= 0) close(descriptor);
+    }
+  };
+  const Socket in, out;
+  sockaddr_in group{};
+  group.sin_family = AF_INET;
+  socklen_t size = sizeof group;
+  const auto failed = [](const char* what) { return std::string(what) + ": " + strerror(errno); };
+  const auto set = [&](const Socket& on, int option, const auto& value) {
+    return setsockopt(on.descriptor, IPPROTO_IP, option, &value, sizeof value) == 0;
+  };
+  // Any free port: those of RTPS are the participants'.
+  if (bind(in.descriptor, reinterpret_cast<const sockaddr*>(&group), size) != 0 ||
+      getsockname(in.descriptor, reinterpret_cast<sockaddr*>(&group), &size) != 0) {
+    return failed("no socket");
+  }
+  group.sin_addr.s_addr = inet_addr("239.255.0.1");
+  const ip_mreq membership{group.sin_addr, interface};
+  if (!set(in, IP_ADD_MEMBERSHIP, membership)) return failed("cannot join a group");
+  if (!set(out, IP_MULTICAST_IF, interface)) return failed("cannot send to a group");
+  const char packet[] = "pocd";
+  if (sendto(out.descriptor, packet, sizeof packet, 0, reinterpret_cast<const sockaddr*>(&group),
+             size) < 0) {
+    return failed("cannot send to a group");
+  }
+  pollfd ready{in.descriptor, POLLIN, 0};
+  return poll(&ready, 1, kWaitMs) == 1 ? "" : "what is sent to a group does not arrive";
 }
 
 /// True when a live process holds the lock on the file.
@@ -92,6 +136,39 @@ Findings check_shared_memory(const std::filesystem::path& folder) {
                         std::to_string(left_over) + " segments (" + std::to_string(bytes / kMiB) +
                             " MiB) of processes that were killed",
                         "fastdds shm clean"});
+  }
+  return findings;
+}
+
+std::map<std::string, std::string> multicast_by_interface() {
+  std::map<std::string, std::string> problems;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return problems;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    if ((one->ifa_flags & IFF_UP) == 0) continue;
+    problems[one->ifa_name] =
+        multicast_problem(reinterpret_cast<const sockaddr_in*>(one->ifa_addr)->sin_addr);
+  }
+  freeifaddrs(all);
+  return problems;
+}
+
+Findings check_multicast(const std::map<std::string, std::string>& by_interface) {
+  Findings findings;
+  const bool none = std::none_of(by_interface.begin(), by_interface.end(),
+                                 [](const auto& entry) { return entry.second.empty(); });
+  for (const auto& [name, problem] : by_interface) {
+    if (problem.empty()) continue;
+    // With another interface that carries it, participants find each other through that one.
+    findings.push_back({none ? Severity::kError : Severity::kNote, "multicast on " + name, problem,
+                        "participants do not find each other through it: let it through (firewall, "
+                        "sandbox), or give them initial peers "
+                        "(--profiles launch_scripts/no_multicast.xml) or a ROS_DISCOVERY_SERVER"});
+  }
+  if (by_interface.empty()) {
+    findings.push_back(
+        {Severity::kError, "network", "no IPv4 interface is up", "ip link set lo up, at least"});
   }
   return findings;
 }

@@ -57,4 +57,15 @@ class GuardedType : public PubSubType {
   }
 };
 
+/// The same bytes under another name and without a key, as ROS 2 readers ask for: the generated
+/// type support decides neither.
+template <class PubSubType>
+class RenamedType : public GuardedType<PubSubType> {
+ public:
+  explicit RenamedType(const char* name) {
+    this->setName(name);
+    this->m_isGetKeyDefined = false;
+  }
+};
+
 }  // namespace pocd::dds

@@ -3,6 +3,7 @@
 #include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -53,12 +54,39 @@ void set_transports(DomainParticipantQos& qos) {
   qos.transport().user_transports = {shared_memory, udp};
 }
 
+std::string buffer_text(std::uint32_t bytes) {
+  return bytes == 0 ? "the system's default size" : std::to_string(bytes) + " bytes";
+}
+
 void warn_of_small_buffers() {
   static std::once_flag once;
   std::call_once(once, [] {
     const std::string problem = socket_buffer_problem(kSocketBytes);
     if (!problem.empty()) log(LogLevel::kWarning, problem);
   });
+}
+
+/// A profile's transports are taken as they are.
+void warn_of_profile(const DomainParticipantQos& qos) {
+  if (qos.transport().use_builtin_transports && qos.transport().user_transports.empty()) return;
+  bool udp = false;
+  for (const auto& transport : qos.transport().user_transports) {
+    const auto* found = dynamic_cast<const rtps::UDPTransportDescriptor*>(transport.get());
+    if (found == nullptr) continue;
+    udp = true;
+    if (found->receiveBufferSize >= kSocketBytes && found->sendBufferSize >= kSocketBytes) continue;
+    static std::once_flag once;
+    std::call_once(once, [&] {
+      log(LogLevel::kWarning,
+          "the profile of the participant gives UDP socket buffers of " +
+              buffer_text(found->receiveBufferSize) + " to receive and " +
+              buffer_text(found->sendBufferSize) +
+              " to send: images will be lost; set receiveBufferSize and sendBufferSize of its "
+              "transport to " +
+              std::to_string(kSocketBytes));
+    });
+  }
+  if (udp) warn_of_small_buffers();
 }
 
 template <class Qos>
@@ -108,6 +136,23 @@ void follow_discovery_server(DomainParticipantQos& qos) {
   if (!rtps::load_environment_server_info(servers) || servers.empty()) return;
   discovery.discoveryProtocol = eprosima::fastrtps::rtps::DiscoveryProtocol_t::SUPER_CLIENT;
   discovery.m_DiscoveryServers = servers;
+}
+
+/// Every place where a participant of this host may listen, and the multicast address, which a list
+/// of peers replaces.
+void ask_this_host(int domain, DomainParticipantQos& qos) {
+  auto& wire = qos.wire_protocol();
+  if (!wire.builtin.initialPeersList.empty()) return;
+  const auto add = [&](const char* address, std::uint32_t port) {
+    eprosima::fastrtps::rtps::Locator_t locator(LOCATOR_KIND_UDPv4, port);
+    eprosima::fastrtps::rtps::IPLocator::setIPv4(locator, address);
+    wire.builtin.initialPeersList.push_back(locator);
+  };
+  const auto number = static_cast<std::uint32_t>(domain);
+  add("239.255.0.1", wire.port.getMulticastPort(number));  // RTPS 2.2, 9.6.1.4.1
+  for (std::uint32_t i = 0; i <= kLastOfAHost; ++i) {
+    add("127.0.0.1", wire.port.getUnicastPort(number, i));
+  }
 }
 
 /// Authentication, access control and encryption by DDS Security's built-in plugins. The files are
@@ -161,6 +206,7 @@ struct Participant::Impl {
   };
   std::map<std::string, UsedTopic> topics;
   std::map<std::string, std::type_index> forms;  // of the types that are registered
+  std::map<Guid, Endpoint> endpoints;
 
   /// The middleware knows types by name: the form that comes second would be dropped, and its
   /// readers and writers given the first.
@@ -216,6 +262,8 @@ Participant::Participant(const BusOptions& options)
   if (qos.transport().user_transports.empty() && qos.transport().use_builtin_transports) {
     set_transports(qos);
     warn_of_small_buffers();
+  } else {
+    warn_of_profile(qos);
   }
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   if (discovery.leaseDuration ==
@@ -227,6 +275,10 @@ Participant::Participant(const BusOptions& options)
   auto& tries = qos.wire_protocol().builtin.mutation_tries;
   if (tries == DomainParticipantQos().wire_protocol().builtin.mutation_tries) tries = kLastOfAHost;
   if (qos.name().size() == 0 || qos.name() == "RTPSParticipant") qos.name(options.name);
+  if (options.ask_this_host) ask_this_host(options.domain, qos);
+  if (!options.user_data.empty()) {
+    qos.user_data().data_vec({options.user_data.begin(), options.user_data.end()});
+  }
   if (options.listener != nullptr) follow_discovery_server(qos);
   if (!options.security_folder.empty()) set_security(options.security_folder, qos);
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
@@ -273,6 +325,21 @@ std::shared_ptr<Topic> Participant::topic(const std::string& name, TypeSupport t
 
 std::optional<std::string> Participant::other_version(const Guid& endpoint) const {
   return impl_->watch.other_version(endpoint);
+}
+
+void Participant::joined(const Guid& endpoint, const Endpoint& what) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->endpoints[endpoint] = what;
+}
+
+void Participant::left(const Guid& endpoint) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->endpoints.erase(endpoint);
+}
+
+std::map<Participant::Guid, Participant::Endpoint> Participant::endpoints() const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->endpoints;
 }
 
 DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& delivery) const {

@@ -7,6 +7,7 @@
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +23,11 @@ struct BusOptions {
   /// Folder with the identity and the permissions of this participant (docs/security.md): it then
   /// talks to nobody who has none by the same authority. Empty: no security.
   std::string security_folder = "";
+  /// Looks for participants of this host by unicast, too, where a profile names no initial peers:
+  /// finds them without multicast.
+  bool ask_this_host = false;
+  /// What others may read of it before they know any of its topics.
+  std::string user_data = "";
   /// Others forget this participant when they have not heard of it for so long [s].
   double lease_s = 5.0;
   /// Hears of everything that is discovered, from the first moment; must outlive the participant.
@@ -30,6 +36,13 @@ struct BusOptions {
 
 /// ROS_DOMAIN_ID, or 0 when it is not set. Throws InputError when it is no domain.
 int default_domain();
+
+using EndpointGuid = std::array<std::uint8_t, 16>;
+inline EndpointGuid to_guid(const eprosima::fastdds::dds::InstanceHandle_t& handle) {
+  EndpointGuid guid{};
+  for (std::size_t i = 0; i < guid.size(); ++i) guid[i] = handle.value[i];
+  return guid;
+}
 
 /// Deletes everything it made when it goes; readers and writers keep it alive. Thread-safe.
 ///
@@ -55,10 +68,19 @@ class Participant {
   eprosima::fastdds::dds::DataReaderQos reader_qos(const std::string& topic,
                                                    const Delivery& delivery) const;
 
-  using Guid = std::array<std::uint8_t, 16>;
+  using Guid = EndpointGuid;
   /// When this reader or writer of another participant announces another version of its type than
   /// this process has: who it is and what the versions are, in words.
   std::optional<std::string> other_version(const Guid& endpoint) const;
+
+  /// A reader or writer of this participant, for those who announce them to others.
+  struct Endpoint {
+    std::string topic;
+    bool reads = false;
+  };
+  void joined(const Guid& endpoint, const Endpoint& what);
+  void left(const Guid& endpoint);
+  std::map<Guid, Endpoint> endpoints() const;
 
   eprosima::fastdds::dds::DomainParticipant* get() const;
   eprosima::fastdds::dds::Publisher* publisher() const;

@@ -25,6 +25,7 @@ struct RawReader::Impl : DataReaderListener {
   std::shared_ptr<Participant> participant;
   std::shared_ptr<Topic> use;
   DataReader* reader = nullptr;
+  Participant::Guid guid{};
   Wakeup* wakeup = nullptr;
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
@@ -41,9 +42,7 @@ struct RawReader::Impl : DataReaderListener {
     matched = status.current_count;
     ever_matched = status.total_count;
     {
-      SampleMeta::Guid guid{};
-      const eprosima::fastrtps::rtps::octet* bytes = status.last_publication_handle.value;
-      std::copy(bytes, bytes + guid.size(), guid.begin());
+      const SampleMeta::Guid guid = to_guid(status.last_publication_handle);
       const std::lock_guard<std::mutex> lock(mutex);
       if (status.current_count_change > 0) {
         writers.insert(guid);
@@ -89,9 +88,12 @@ RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& 
   impl_->reliable = qos.reliability().kind == RELIABLE_RELIABILITY_QOS;
   impl_->reader = owner.subscriber()->create_datareader(impl_->use.get(), qos, impl_.get());
   if (impl_->reader == nullptr) throw InputError("cannot create a reader of topic " + topic_);
+  impl_->guid = to_guid(impl_->reader->get_instance_handle());
+  owner.joined(impl_->guid, {topic_, true});
 }
 
 RawReader::~RawReader() {
+  impl_->participant->left(impl_->guid);
   impl_->reader->set_listener(nullptr);
   impl_->participant->subscriber()->delete_datareader(impl_->reader);
 }
@@ -131,8 +133,7 @@ bool RawReader::take_raw(void* sample, SampleMeta& meta) {
     const bool got = taken == ReturnCode_t::RETCODE_OK;
     if (!got && damaged == 0) return false;
     if (!got) continue;
-    const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
-    std::copy(writer, writer + meta.writer.size(), meta.writer.begin());
+    meta.writer = to_guid(info.publication_handle);
     // Its bytes may be read as this type, and mean something else.
     const std::optional<std::string> other = impl_->participant->other_version(meta.writer);
     if (other) {

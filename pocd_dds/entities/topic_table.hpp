@@ -1,6 +1,9 @@
 // Every topic of the component: name, type, quality of service, direction. Nothing else names one.
 #pragma once
 
+#include <string>
+#include <string_view>
+
 #include "pocd/input/input_config.hpp"
 #include "pocd/input/robot_topic.hpp"
 
@@ -104,6 +107,14 @@ inline constexpr TopicSpec kHealth{"pocd/health",
                                    Direction::kOut,
                                    true,
                                    {true, true, 1, 0, 0, false, 1.5}};
+// The same for ROS 2, which knows neither keys nor disposes.
+inline constexpr TopicSpec kRosObjects{"rt/pocd/objects", "pocd_interfaces::msg::dds_::ObjectList_",
+                                       Direction::kOut, false, latched(1)};
+inline constexpr TopicSpec kRosObjectEvents{"rt/pocd/object_events",
+                                            "pocd_interfaces::msg::dds_::ObjectEvent_",
+                                            Direction::kOut, false, reliable(1000)};
+inline constexpr TopicSpec kRosHealth{"rt/pocd/health", "pocd_interfaces::msg::dds_::NodeHealth_",
+                                      Direction::kOut, false, latched(1)};
 inline constexpr TopicSpec kDiagnostics{"rt/diagnostics",
                                         "diagnostic_msgs::msg::dds_::DiagnosticArray_",
                                         Direction::kOut, false, reliable(10)};
@@ -120,6 +131,19 @@ inline constexpr TopicSpec kSurface{"rt/pocd/surface", "sensor_msgs::msg::dds_::
 inline constexpr TopicSpec kRmfObstacles{"rt/rmf_obstacles",
                                          "rmf_obstacle_msgs::msg::dds_::Obstacles_",
                                          Direction::kOut, false, best_effort(10)};
+
+// ROS 2's own: which endpoint belongs to which node of its graph.
+inline constexpr TopicSpec kRosGraph{"ros_discovery_info",
+                                     "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
+                                     Direction::kOut, false, latched(1)};
+
+/// rt/pocd/map in another namespace; what several nodes may share stays.
+inline std::string in_namespace(const TopicSpec& spec, const std::string& topic_namespace) {
+  constexpr std::string_view kDefault = "rt/pocd/";
+  const std::string_view name = spec.name;
+  if (name.substr(0, kDefault.size()) != kDefault) return spec.name;
+  return "rt/" + topic_namespace + "/" + std::string(name.substr(kDefault.size()));
+}
 
 }  // namespace topics
 

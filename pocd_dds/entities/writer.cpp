@@ -20,6 +20,7 @@ struct RawWriter::Impl : DataWriterListener {
   std::shared_ptr<Participant> participant;
   std::shared_ptr<Topic> use;
   DataWriter* writer = nullptr;
+  Participant::Guid guid{};
   std::string topic;
   std::atomic<int> matched{0}, ever_matched{0};
   std::atomic<std::uint64_t> incompatible{0}, misreaders{0};
@@ -28,9 +29,7 @@ struct RawWriter::Impl : DataWriterListener {
     matched = status.current_count;
     ever_matched = status.total_count;
     if (status.current_count_change <= 0) return;
-    Participant::Guid reader{};
-    const eprosima::fastrtps::rtps::octet* bytes = status.last_subscription_handle.value;
-    std::copy(bytes, bytes + reader.size(), reader.begin());
+    const Participant::Guid reader = to_guid(status.last_subscription_handle);
     const std::optional<std::string> other = participant->other_version(reader);
     if (other && misreaders.fetch_add(1) == 0) {
       log_warning("{}: a reader cannot make use of it: {}", topic, *other);
@@ -57,9 +56,12 @@ RawWriter::RawWriter(std::shared_ptr<Participant> participant, const TopicSpec& 
   qos.user_data().data_vec(idl_announcement(spec.type));
   impl_->writer = owner.publisher()->create_datawriter(impl_->use.get(), qos, impl_.get());
   if (impl_->writer == nullptr) throw InputError("cannot create a writer of topic " + topic_);
+  impl_->guid = to_guid(impl_->writer->get_instance_handle());
+  owner.joined(impl_->guid, {topic_, false});
 }
 
 RawWriter::~RawWriter() {
+  impl_->participant->left(impl_->guid);
   impl_->writer->set_listener(nullptr);
   impl_->participant->publisher()->delete_datawriter(impl_->writer);
 }

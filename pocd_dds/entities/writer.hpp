@@ -67,4 +67,20 @@ class Writer : public RawWriter {
   bool dispose(Sample& sample) { return dispose_raw(&sample); }
 };
 
+/// Of samples that have another name on the bus than the generated type support gives them, and no
+/// key.
+template <class PubSubType>
+class RenamedWriter : public RawWriter {
+ public:
+  using Sample = typename PubSubType::type;
+
+  RenamedWriter(std::shared_ptr<Participant> participant, const TopicSpec& spec,
+                const std::string& topic)
+      : RawWriter(std::move(participant), spec, topic,
+                  eprosima::fastdds::dds::TypeSupport(new RenamedType<PubSubType>(spec.type)),
+                  spec.delivery) {}
+
+  bool write(Sample& sample) { return write_raw(&sample); }
+};
+
 }  // namespace pocd::dds

@@ -25,6 +25,11 @@ const TopicSpec& line_of(InputStream stream) {
   return topics::kTfStatic;
 }
 
+bool has_images(const TopicSpec& spec) {
+  const std::string_view type = spec.type;
+  return type == topics::kDepth.type || type == topics::kCompressedImageType;
+}
+
 }  // namespace
 
 TopicSpec spec_of(InputStream stream, bool compressed) {
@@ -36,9 +41,13 @@ TopicSpec spec_of(InputStream stream, bool compressed) {
 Delivery input_delivery(const TopicSpec& spec, bool lossless) {
   if (!lossless) return spec.delivery;
   constexpr int kImages = 8, kSmallOnes = 1000;
-  const std::string_view type = spec.type;
-  const bool images = type == topics::kDepth.type || type == topics::kCompressedImageType;
-  return {true, false, 0, images ? kImages : kSmallOnes, 0, false, 0};
+  return {true, false, 0, has_images(spec) ? kImages : kSmallOnes, 0, false, 0};
+}
+
+Delivery input_delivery(const TopicSpec& spec, const NodeConfig& node) {
+  Delivery delivery = input_delivery(spec, node.lossless);
+  if (node.reliable_tf_and_info && !has_images(spec)) delivery.reliable = true;
+  return delivery;
 }
 
 }  // namespace pocd::dds

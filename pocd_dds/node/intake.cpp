@@ -41,10 +41,11 @@ Intake::Intake(const std::shared_ptr<Participant>& participant, const NodeConfig
       topics_(node),
       roster_(node),
       transforms_(static_cast<StampNs>(node.max_pose_gap_s * 1e9)),
-      tf_(node.topics.own_tf() ? nullptr
-                               : std::make_unique<TransformInput>(
-                                     participant, bus_name(node.topics.tf),
-                                     bus_name(node.topics.tf_static), node.lossless, tf_wakeup_)),
+      tf_(node.topics.own_tf()
+              ? nullptr
+              : std::make_unique<TransformInput>(participant, bus_name(node.topics.tf),
+                                                 bus_name(node.topics.tf_static),
+                                                 input_delivery(topics::kTf, node), tf_wakeup_)),
       context_{node_, labels_, pipeline.map.max_depth_m, transforms_, problems_},
       merger_(static_cast<StampNs>(node.merge_wait_s * 1e9)) {
   for (const RobotConfig& robot : node.robots) meet(robot.name, robot, true);
@@ -260,7 +261,8 @@ void Intake::update_status() {
       waiting = "the other robots wait for its next frame";
     }
     status.robots.push_back({name, input.live(), input.frames(), input.dropped(), input.lost(),
-                             std::move(waiting), input.images(), input.rate_limited()});
+                             std::move(waiting), input.images(), input.rate_limited(),
+                             input.live() && silent_s >= node_.silent_wait_s});
   }
   status.departures.assign(departures_.begin(), departures_.end());
   status.problems = problems_.entries();

@@ -31,6 +31,7 @@ struct RobotStatus {
   std::string waiting_for;         ///< "" or what its frames wait for, or why it is not waited for
   std::uint64_t images = 0;        ///< depth images that came
   std::uint64_t rate_limited = 0;  ///< of them, beyond node.max_frame_rate_hz
+  bool silent = false;             ///< is there, and has sent none for node.silent_wait_s
 };
 
 /// A robot that has gone, and why.

@@ -22,6 +22,7 @@
 #include "pocd_dds/node/node_memory.hpp"
 #include "pocd_dds/node/object_publication.hpp"
 #include "pocd_dds/node/rival_watch.hpp"
+#include "pocd_dds/node/ros_graph.hpp"
 #include "pocd_dds/node/ros_outputs.hpp"
 
 namespace pocd::dds {
@@ -34,8 +35,9 @@ constexpr double kStatusPeriodS = 1.0;
 
 double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
 
-BusOptions watched(BusOptions bus, BusWatch& watch) {
+BusOptions watched(BusOptions bus, const NodeConfig& node, BusWatch& watch) {
   bus.listener = &watch;
+  bus.user_data = RosGraph::user_data(node.outputs);
   return bus;
 }
 
@@ -45,7 +47,7 @@ struct Node::Impl {
   explicit Impl(const NodeOptions& options)
       : config(options.config),
         on_status(options.on_status),
-        participant(std::make_shared<Participant>(watched(options.bus, watch))),
+        participant(std::make_shared<Participant>(watched(options.bus, config.node, watch))),
         pipeline(config.pipeline),
         keeper(config),
         latency(options.latency_file),
@@ -68,7 +70,8 @@ struct Node::Impl {
     }
     // What says that the node is there, and what brings frames, comes after all that is known.
     status = std::make_unique<StatusPublication>(participant, options.bus.name, options.epoch,
-                                                 config.node.outputs.diagnostics_hz);
+                                                 config.node.outputs);
+    graph = std::make_unique<RosGraph>(participant, config.node.outputs);
     intake =
         std::make_unique<Intake>(participant, config.node, config.pipeline, watch, queue, latency);
     worker = std::thread([this] { guard("pocd_worker", [this] { work(); }); });
@@ -146,8 +149,9 @@ struct Node::Impl {
   std::exception_ptr failure;
   std::atomic<bool> failed{false}, worked{false};
 
-  // run()'s thread only.
+  // run()'s thread only; its writers are made after all others.
   std::unique_ptr<StatusPublication> status;
+  std::unique_ptr<RosGraph> graph;
   HealthRule health;
 
   std::unique_ptr<Intake> intake;
@@ -300,6 +304,9 @@ void Node::Impl::add_problems(IntakeStatus& input) {
   if (outputs.grid_too_large()) {
     input.problems.push_back({topics::kOccupancy.name, "grid_too_large", 1, ""});
   }
+  if (outputs.grid_cut()) {
+    input.problems.push_back({topics::kOccupancy.name, "outside_extent", 1, ""});
+  }
   for (const auto& [topic, count] : outputs.broken()) {
     input.problems.push_back({topic, "output_failed", count, ""});
   }
@@ -322,7 +329,7 @@ NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
                             const std::string& word) {
   HealthSigns signs;
   signs.write_failures = work.write_failures;
-  signs.output_failures = outputs.failures() + draws_failed;
+  signs.output_failures = outputs.failures() + draws_failed + graph.failures();
   for (const auto& [topic, count] : outputs.broken()) signs.output_failures += count;
   for (const auto& entry : input.problems) signs.problems += entry.count;
   signs.dropped = queue.dropped();
@@ -365,6 +372,7 @@ void Node::Impl::send_status(const std::string& word) {
   const NodeState state = judge(input, work, word);
   failing = state.verdict.level >= 2;
   status->send(input, work, queue.size(), queue.dropped(), state, clock.now_ns());
+  graph->update();
   if (on_status) on_status(state, ending);
 }
 

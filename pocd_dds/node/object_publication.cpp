@@ -1,5 +1,7 @@
 #include "pocd_dds/node/object_publication.hpp"
 
+#include "pocd_dds/bridge/geometry_messages.hpp"
+
 #include <utility>
 
 namespace pocd::dds {
@@ -11,11 +13,31 @@ ObjectPublication::ObjectPublication(const std::shared_ptr<Participant>& partici
       classes_(config.pipeline.classes),
       run_{static_cast<std::uint32_t>(config.node.map_id), epoch, lineage},
       states_(participant, topics::kObjects),
-      events_(participant, topics::kObjectEvents) {}
+      events_(participant, topics::kObjectEvents) {
+  const RosOutputConfig& outputs = node_.outputs;
+  if (outputs.twins_hz <= 0.0) return;
+  const auto make = [&](auto& writer, const TopicSpec& spec) {
+    writer = std::make_unique<typename std::decay_t<decltype(writer)>::element_type>(
+        participant, spec, topics::in_namespace(spec, outputs.topic_namespace));
+  };
+  make(ros_list_, topics::kRosObjects);
+  make(ros_events_, topics::kRosObjectEvents);
+}
+
+void ObjectPublication::note_removal(ObjectId id, bool forgotten) {
+  if (!ros_list_) return;
+  pocd_msgs::msg::ObjectRemoval& removal = removals_.emplace_back();
+  removal.uuid(object_uuid(run_.names(), id));
+  removal.local_id(static_cast<std::uint32_t>(to_index(id)));
+  removal.stamp(to_time(stamp_ns_));
+  removal.forgotten(forgotten);
+  if (removals_.size() > kMostRemovals) removals_.pop_front();
+}
 
 void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   stamp_ns_ = stamp_ns;
+  if (!result.changed_objects.empty() || !result.retired.empty()) list_outdated_ = true;
   for (const ObjectEvent& event : result.events) {
     // A gap in their numbers, which subscribers see.
     if (events_waiting_.size() >= kMostEvents) events_waiting_.pop_front(), ++dropped_events_;
@@ -36,6 +58,7 @@ void ObjectPublication::add(const FrameResult& result, StampNs stamp_ns) {
   for (const ObjectId id : result.retired) {
     unseen_.erase(id);
     const auto known = objects_.find(id);
+    if (known != objects_.end()) note_removal(id, forgotten.count(id) > 0);
     if (known != objects_.end() && forgotten.count(id) > 0) {
       forgotten_.push_back(std::move(known->second));
       forgotten_.back().forgotten = true;
@@ -60,6 +83,7 @@ void ObjectPublication::send_events() {
   for (const ObjectEvent& event : events) {
     auto message = event_message(event, run_, classes_, node_.map_frame);
     events_.write(message);
+    if (ros_events_) ros_events_->write(message);
   }
 }
 
@@ -147,6 +171,36 @@ bool ObjectPublication::send_state(ObjectId id) {
   return true;
 }
 
+void ObjectPublication::send_list(bool now) {
+  if (!ros_list_) return;
+  const auto time = std::chrono::steady_clock::now();
+  const double since_s = std::chrono::duration<double>(time - list_sent_).count();
+  if (!now && since_s * node_.outputs.twins_hz < 1.0) return;
+  std::map<ObjectId, ObjectSnapshot> objects;
+  pocd_msgs::msg::ObjectList list;
+  StampNs stamp_ns = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!list_outdated_) return;
+    list_outdated_ = false;
+    objects = objects_;
+    list.removed().assign(removals_.begin(), removals_.end());
+    stamp_ns = stamp_ns_;
+  }
+  list_sent_ = time;
+  list.header(header_of(stamp_ns, node_.map_frame));
+  list.map_id(run_.map_id);
+  list.epoch(run_.epoch);
+  list.lineage(run_.names());
+  list.number(++lists_);
+  for (const auto& [id, object] : objects) {
+    list.objects().push_back(object_message(object, run_, classes_, stamp_ns, node_.map_frame));
+  }
+  if (ros_list_->write(list)) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  list_outdated_ = true;
+}
+
 void ObjectPublication::send_due(bool now) {
   send_events();
   // What Fast DDS refuses, because the writer is full, is tried again next time.
@@ -159,10 +213,12 @@ void ObjectPublication::send_due(bool now) {
   }
   // What went while its state was written.
   dispose_gone();
+  send_list(now);
 }
 
 bool ObjectPublication::wait_acknowledged(std::chrono::steady_clock::time_point end) {
-  return states_.wait_acknowledged(end) && events_.wait_acknowledged(end);
+  return states_.wait_acknowledged(end) && events_.wait_acknowledged(end) &&
+         (!ros_list_ || (ros_list_->wait_acknowledged(end) && ros_events_->wait_acknowledged(end)));
 }
 
 }  // namespace pocd::dds

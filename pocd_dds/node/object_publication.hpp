@@ -49,7 +49,10 @@ class ObjectPublication {
     const std::lock_guard<std::mutex> lock(mutex_);
     return objects_.size();
   }
-  std::uint64_t failures() const { return states_.failures() + events_.failures(); }
+  std::uint64_t failures() const {
+    return states_.failures() + events_.failures() +
+           (ros_list_ ? ros_list_->failures() + ros_events_->failures() : 0);
+  }
   /// Events that were not written because more than kMostEvents waited.
   std::uint64_t dropped_events() const {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -59,6 +62,7 @@ class ObjectPublication {
  private:
   static constexpr std::size_t kMostEvents = 10000;
   static constexpr std::chrono::seconds kForgottenStays{5};
+  static constexpr std::size_t kMostRemovals = 100;  // in a list for ROS 2
 
   void send_events();
   void dispose_gone();
@@ -68,22 +72,32 @@ class ObjectPublication {
   /// Ids of objects whose state is to be written now.
   std::vector<ObjectId> take_due(bool now);
   bool send_state(ObjectId id);
+  /// All objects in one message, when one has changed or gone.
+  void send_list(bool now);
+  void note_removal(ObjectId id, bool forgotten);
 
   const NodeConfig node_;
   const ClassMap classes_;
   const MapRun run_;
   Writer<pocd_msgs::msg::ObjectStatePubSubType> states_;
   Writer<pocd_msgs::msg::ObjectEventPubSubType> events_;
+  // For ROS 2; null when they are off.
+  std::unique_ptr<RenamedWriter<pocd_msgs::msg::ObjectListPubSubType>> ros_list_;
+  std::unique_ptr<RenamedWriter<pocd_msgs::msg::ObjectEventPubSubType>> ros_events_;
 
   // Only the thread that writes.
   std::set<ObjectId> published_;
   std::chrono::steady_clock::time_point last_sent_{};
   std::deque<std::pair<ObjectId, std::chrono::steady_clock::time_point>> said_forgotten_;
+  std::chrono::steady_clock::time_point list_sent_{};
+  std::uint64_t lists_ = 0;
 
   mutable std::mutex mutex_;  // guards what follows, and is not held while something is written
   std::map<ObjectId, ObjectSnapshot> objects_;
   std::set<ObjectId> changed_, gone_, touched_;
-  std::vector<ObjectSnapshot> forgotten_;  // with their last state
+  std::vector<ObjectSnapshot> forgotten_;               // with their last state
+  std::deque<pocd_msgs::msg::ObjectRemoval> removals_;  // the last ones, for ROS 2
+  bool list_outdated_ = true;                           // that there is nothing is to be said, too
   std::deque<ObjectEvent> events_waiting_;
   std::uint64_t dropped_events_ = 0;
   StampNs stamp_ns_ = 0;

@@ -55,12 +55,12 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
       tf_(has_own_tf(node, robot)
               ? std::make_unique<TransformInput>(participant, streams_.topic(InputStream::kTf),
                                                  streams_.topic(InputStream::kTfStatic),
-                                                 node.lossless, wakeup)
+                                                 input_delivery(topics::kTf, node), wakeup)
               : nullptr),
       odometry_(participant, topics::kOdometry, streams_.topic(InputStream::kOdometry),
-                input_delivery(topics::kOdometry, node.lossless), wakeup),
+                input_delivery(topics::kOdometry, node), wakeup),
       camera_info_(participant, topics::kCameraInfo, streams_.topic(InputStream::kCameraInfo),
-                   input_delivery(topics::kCameraInfo, node.lossless), wakeup) {
+                   input_delivery(topics::kCameraInfo, node), wakeup) {
   const auto image_reader = [&](InputStream stream) {
     return std::make_unique<ImageReader>(participant, stream, streams_.topic(stream), node.lossless,
                                          wakeup);

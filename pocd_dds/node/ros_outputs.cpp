@@ -20,17 +20,19 @@ std::string source_of(std::uint64_t epoch) {
 }
 
 OccupancyOptions occupancy_options(const NodeFile& config) {
-  return {config.pipeline.map.voxel_size_m, config.pipeline.map.truncation_m(),
-          config.node.outputs.occupancy_low_m, config.node.outputs.occupancy_high_m,
-          config.node.outputs.occupancy_not_looked_at};
-}
-
-/// rt/pocd/map in another namespace; what several nodes may share stays.
-std::string output_topic(const TopicSpec& spec, const std::string& topic_namespace) {
-  constexpr std::string_view kDefault = "rt/pocd/";
-  const std::string_view name = spec.name;
-  if (name.substr(0, kDefault.size()) != kDefault) return spec.name;
-  return "rt/" + topic_namespace + "/" + std::string(name.substr(kDefault.size()));
+  const GridExtentConfig& extent = config.node.outputs.occupancy_extent;
+  const double cell_m = config.pipeline.map.voxel_size_m;
+  OccupancyOptions options{cell_m,
+                           config.pipeline.map.truncation_m(),
+                           config.node.outputs.occupancy_low_m,
+                           config.node.outputs.occupancy_high_m,
+                           config.node.outputs.occupancy_not_looked_at,
+                           {}};
+  if (extent.given()) {
+    options.extent =
+        cells_around(extent.min_x_m, extent.min_y_m, extent.max_x_m, extent.max_y_m, cell_m);
+  }
+  return options;
 }
 
 /// The keys of a list of steps, changed ones and removed ones.
@@ -61,14 +63,19 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
   const auto make = [&](auto& writer, const Pace& pace, const TopicSpec& spec) {
     using AnyWriter = typename std::decay_t<decltype(writer)>::element_type;
     if (pace.off()) return;
-    writer = std::make_unique<AnyWriter>(participant, spec,
-                                         output_topic(spec, rates_.topic_namespace), spec.delivery);
+    writer = std::make_unique<AnyWriter>(
+        participant, spec, topics::in_namespace(spec, rates_.topic_namespace), spec.delivery);
   };
   make(markers_, markers_pace_, topics::kMarkers);
   make(grid_, occupancy_pace_, topics::kOccupancy);
   make(grid_updates_, occupancy_pace_, topics::kOccupancyUpdates);
   make(surface_, surface_pace_, topics::kSurface);
-  make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
+  if (rates_.ros_release != "humble") {
+    make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
+  } else if (!obstacles_pace_.off()) {
+    humble_obstacles_ = std::make_unique<decltype(humble_obstacles_)::element_type>(
+        participant, topics::kRmfObstacles, topics::kRmfObstacles.name);
+  }
 }
 
 void RosOutputs::copy_tiles(const Changes<TileKey, MapTile>& tiles,
@@ -100,7 +107,8 @@ void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
   occupancy_due_ = grid_ && ((room && occupancy_pace_.due(now_ns)) || last);
   surface_due_ =
       surface_ && surface_->matched() > 0 && ((room && surface_pace_.due(now_ns)) || last);
-  obstacles_due_ = obstacles_ && obstacles_pace_.due(now_ns) && !last;
+  const bool obstacles = obstacles_ || humble_obstacles_;
+  obstacles_due_ = obstacles && obstacles_pace_.due(now_ns) && !last;
   stamp_ns_ = stamp_ns;
   now_ns_ = now_ns;
   last_ = last;
@@ -117,12 +125,11 @@ void RosOutputs::collect(const Changes<ObjectId, ObjectSnapshot>& objects,
   }
   if (occupancy_due_ || surface_due_) copy_tiles(tiles, not_looked);
   // What no output needs must not grow for ever.
-  if (!markers_ && !obstacles_ && !surface_) objects.keys.clear();
+  if (!markers_ && !obstacles && !surface_) objects.keys.clear();
   if (!grid_ && !surface_) tiles.keys.clear();
 }
 
-template <class AnyWriter>
-bool RosOutputs::attempt(const std::unique_ptr<AnyWriter>& writer, void (RosOutputs::*send_one)()) {
+bool RosOutputs::attempt(const std::string& topic, void (RosOutputs::*send_one)()) {
   std::string why;
   try {
     (this->*send_one)();
@@ -133,8 +140,8 @@ bool RosOutputs::attempt(const std::unique_ptr<AnyWriter>& writer, void (RosOutp
     why = "unknown exception";
   }
   const std::lock_guard<std::mutex> lock(broken_mutex_);
-  if (broken_[writer->topic()]++ == 0) {
-    spdlog::error("{}: could not be made: {} (logged once, counted)", writer->topic(), why);
+  if (broken_[topic]++ == 0) {
+    spdlog::error("{}: could not be made: {} (logged once, counted)", topic, why);
   }
   return false;
 }
@@ -145,10 +152,12 @@ void RosOutputs::spend(const RawWriter& writer, std::size_t bytes) {
 
 void RosOutputs::send() {
   // After a failure the next one says all that there is.
-  if (markers_due_ && !attempt(markers_, &RosOutputs::send_markers)) all_markers_anew_ = true;
-  if (obstacles_due_) attempt(obstacles_, &RosOutputs::send_obstacles);
-  if (occupancy_due_ && !attempt(grid_, &RosOutputs::send_occupancy)) grid_unsent_ = true;
-  if (surface_due_ && !attempt(surface_, &RosOutputs::send_surface)) surface_unsent_ = true;
+  if (markers_due_ && !attempt(markers_->topic(), &RosOutputs::send_markers))
+    all_markers_anew_ = true;
+  if (obstacles_due_) attempt(topics::kRmfObstacles.name, &RosOutputs::send_obstacles);
+  if (occupancy_due_ && !attempt(grid_->topic(), &RosOutputs::send_occupancy)) grid_unsent_ = true;
+  if (surface_due_ && !attempt(surface_->topic(), &RosOutputs::send_surface))
+    surface_unsent_ = true;
   markers_due_ = obstacles_due_ = occupancy_due_ = surface_due_ = false;
 }
 
@@ -162,7 +171,8 @@ bool RosOutputs::wait_acknowledged(std::chrono::steady_clock::time_point end) {
 
 std::uint64_t RosOutputs::failures() const {
   const auto of = [](const auto& writer) { return writer ? writer->failures() : 0; };
-  return of(markers_) + of(grid_) + of(grid_updates_) + of(surface_) + of(obstacles_);
+  return of(markers_) + of(grid_) + of(grid_updates_) + of(surface_) + of(obstacles_) +
+         of(humble_obstacles_);
 }
 
 void RosOutputs::send_markers() {
@@ -174,7 +184,14 @@ void RosOutputs::send_markers() {
 void RosOutputs::send_obstacles() {
   auto message = obstacles_message(objects_, config_.pipeline.classes, obstacle_options_, now_ns_,
                                    config_.node.map_frame);
-  if (!message.obstacles().empty()) obstacles_->write(message);
+  if (message.obstacles().empty()) return;
+  if (obstacles_) {
+    obstacles_->write(message);
+    return;
+  }
+  rmf_obstacle_msgs::msg::ObstaclesHumble list;
+  list.obstacles(std::move(message.obstacles()));
+  humble_obstacles_->write(list);
 }
 
 void RosOutputs::send_occupancy() {
@@ -191,6 +208,10 @@ void RosOutputs::send_occupancy() {
                    OccupancyProjection::kMostCells);
     }
     return;
+  }
+  if (projection_.cut() && !grid_cut_.exchange(true)) {
+    spdlog::warn("{}: part of the map lies outside of node.outputs.occupancy_extent",
+                 grid_->topic());
   }
   // Who joins has the last whole grid, but not the updates since then: a new reader of either topic
   // makes it whole again, and so does the end.

@@ -51,6 +51,8 @@ class RosOutputs {
   std::uint64_t failures() const;
   /// The grid is not published: tiles are too far apart. Thread-safe.
   bool grid_too_large() const { return grid_too_large_; }
+  /// Part of the map is outside of the grid's fixed extent. Thread-safe.
+  bool grid_cut() const { return grid_cut_; }
   /// Messages that could not be made, by topic. Thread-safe.
   std::map<std::string, std::uint64_t> broken() const {
     const std::lock_guard<std::mutex> lock(broken_mutex_);
@@ -63,8 +65,7 @@ class RosOutputs {
   void send_occupancy();
   void send_surface();
   /// Runs one of the above. False: what it has thrown is counted under the topic.
-  template <class AnyWriter>
-  bool attempt(const std::unique_ptr<AnyWriter>& writer, void (RosOutputs::*send_one)());
+  bool attempt(const std::string& topic, void (RosOutputs::*send_one)());
   void spend(const RawWriter& writer, std::size_t bytes);
   void copy_tiles(const Changes<TileKey, MapTile>& tiles, const std::set<BlockKey>& not_looked);
 
@@ -76,6 +77,9 @@ class RosOutputs {
   std::unique_ptr<Writer<map_msgs::msg::OccupancyGridUpdatePubSubType>> grid_updates_;
   std::unique_ptr<Writer<sensor_msgs::msg::PointCloud2PubSubType>> surface_;
   std::unique_ptr<Writer<rmf_obstacle_msgs::msg::ObstaclesPubSubType>> obstacles_;
+  // One of the two.
+  std::unique_ptr<RenamedWriter<rmf_obstacle_msgs::msg::ObstaclesHumblePubSubType>>
+      humble_obstacles_;
   ByteBudget budget_;  // of clouds and grids, which have no parts
   Pace markers_pace_, occupancy_pace_, surface_pace_, obstacles_pace_;
 
@@ -93,7 +97,7 @@ class RosOutputs {
   bool all_markers_anew_ = true;
   Departures marker_departures_;
   OccupancyProjection projection_;
-  std::atomic<bool> grid_too_large_{false};
+  std::atomic<bool> grid_too_large_{false}, grid_cut_{false};
   StampNs grid_whole_ns_ = 0;   // when the last whole grid was sent
   int grid_readers_ = 0;        // ever matched when the last whole grid was sent
   bool grid_outdated_ = false;  // updates have been sent since the last whole one

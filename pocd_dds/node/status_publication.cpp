@@ -88,10 +88,16 @@ void add_departed(const IntakeStatus& intake, const std::string& node,
 }  // namespace
 
 StatusPublication::StatusPublication(const std::shared_ptr<Participant>& participant,
-                                     std::string name, std::uint64_t epoch, double diagnostics_hz)
+                                     std::string name, std::uint64_t epoch,
+                                     const RosOutputConfig& outputs)
     : name_(std::move(name)), epoch_(epoch), health_(participant, topics::kHealth) {
-  if (diagnostics_hz <= 0.0) return;
-  diagnostics_period_s_ = 1.0 / diagnostics_hz;
+  if (outputs.twins_hz > 0.0) {
+    ros_health_ = std::make_unique<RenamedWriter<pocd_msgs::msg::NodeHealthPubSubType>>(
+        participant, topics::kRosHealth,
+        topics::in_namespace(topics::kRosHealth, outputs.topic_namespace));
+  }
+  if (outputs.diagnostics_hz <= 0.0) return;
+  diagnostics_period_s_ = 1.0 / outputs.diagnostics_hz;
   diagnostics_ = std::make_unique<Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType>>(
       participant, topics::kDiagnostics);
 }
@@ -136,7 +142,8 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     const std::string message = !robot.live                 ? "no source of depth images"
                                 : robot.waiting_for.empty() ? "ok"
                                                             : robot.waiting_for;
-    auto status = status_of(robot.live ? kOk : kWarning, name_ + ": " + robot.name, message);
+    auto status =
+        status_of(robot.live && !robot.silent ? kOk : kWarning, name_ + ": " + robot.name, message);
     add(status, "frames", std::to_string(robot.frames));
     add(status, "frames dropped as incomplete", std::to_string(robot.dropped));
     add(status, "images lost on the bus", std::to_string(robot.lost));
@@ -198,6 +205,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   if (!work.last_warning.empty()) add(node, "last warning", work.last_warning);
   diagnostics.status().insert(diagnostics.status().begin(), node);
   health_.write(health);
+  if (ros_health_) ros_health_->write(health);
   if (!diagnostics_) return;
   // Health keeps its own rhythm of about a second, so the first one that is not much too early.
   const double since_s = std::chrono::duration<double>(now - diagnostics_sent_).count();

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "diagnostic_msgsPubSubTypes.h"
+#include "pocd/config/node_config.hpp"
 #include "pocd/map/map_memory.hpp"
 #include "pocd/memory/warehouse_memory.hpp"
 #include "pocd_dds/entities/writer.hpp"
@@ -59,9 +60,9 @@ struct WorkStatus {
 /// Not thread-safe.
 class StatusPublication {
  public:
-  /// Diagnostics at most at `diagnostics_hz`, 0: none.
+  /// Of `outputs`: the rates of diagnostics and of the twins for ROS 2; 0: none.
   StatusPublication(const std::shared_ptr<Participant>& participant, std::string name,
-                    std::uint64_t epoch, double diagnostics_hz);
+                    std::uint64_t epoch, const RosOutputConfig& outputs);
 
   /// Health is stamped by the wall clock, diagnostics with `now_ns`, the time of their readers.
   void send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
@@ -77,6 +78,7 @@ class StatusPublication {
   std::uint64_t map_bytes_ = 0;  // sent at the time of the status before
   std::chrono::steady_clock::time_point sent_{};
   Writer<pocd_msgs::msg::NodeHealthPubSubType> health_;
+  std::unique_ptr<RenamedWriter<pocd_msgs::msg::NodeHealthPubSubType>> ros_health_;
   std::unique_ptr<Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType>> diagnostics_;
   double diagnostics_period_s_ = 0.0;
   std::chrono::steady_clock::time_point diagnostics_sent_{};

@@ -2,7 +2,6 @@
 
 #include "pocd/input/robot_streams.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
-#include "pocd_dds/node/input_delivery.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -13,8 +12,8 @@ constexpr int kMostMessages = 1000;  // taken in one turn
 
 TransformInput::TransformInput(const std::shared_ptr<Participant>& participant,
                                const std::string& tf_topic, const std::string& tf_static_topic,
-                               bool lossless, Wakeup& wakeup)
-    : moving_(participant, topics::kTf, tf_topic, input_delivery(topics::kTf, lossless), wakeup),
+                               const Delivery& delivery, Wakeup& wakeup)
+    : moving_(participant, topics::kTf, tf_topic, delivery, wakeup),
       static_(participant, topics::kTfStatic, tf_static_topic, topics::kTfStatic.delivery, wakeup) {
 }
 

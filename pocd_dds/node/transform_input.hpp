@@ -17,7 +17,7 @@ class TransformInput {
  public:
   /// `wakeup` must outlive it.
   TransformInput(const std::shared_ptr<Participant>& participant, const std::string& tf_topic,
-                 const std::string& tf_static_topic, bool lossless, Wakeup& wakeup);
+                 const std::string& tf_static_topic, const Delivery& delivery, Wakeup& wakeup);
 
   /// Puts what has arrived into the tree. The child frames of what moves.
   std::set<std::string> drain(TransformTree& tree, ProblemCounter& problems);

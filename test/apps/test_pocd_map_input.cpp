@@ -114,6 +114,28 @@ TEST_F(PocdMapInput, OutputThatIsAFileIsNamed) {
   expect_one_line_failure(run(), out_.string());
 }
 
+// Labels from 10 on are of class 2, which the configuration does not have; they are signed here, as
+// some exporters write them.
+TEST_F(PocdMapInput, IdsThatAreNoClassAreNamed) {
+  const auto clouds = folder_.path() / "clouds";
+  std::filesystem::create_directories(clouds);
+  std::ofstream out(clouds / "a.pcd");
+  out << "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z label\nSIZE 4 4 4 4\nTYPE F F F I\nCOUNT 1 1 1 "
+         "1\nWIDTH 8\nHEIGHT 6\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 48\nDATA ascii\n";
+  for (int v = 0; v < 6; ++v) {
+    for (int u = 0; u < 8; ++u) out << "0 0 1.5 " << (u < 2 ? 17 : 1) << '\n';
+  }
+  out.close();
+  const CommandResult result =
+      run_command({kCommand, "--dataset", "pcd", "--input", clouds.string(), "--config",
+                   kGoodConfig, "--camera", "8,6,10,10,3.5,2.5", "--camera-pose", "0,0,0,0,0,0,1",
+                   "--output", out_.string()});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err,
+            "unlisted_class: ids that are no class of classes.list and so background: 2; 25 % of "
+            "the pixels\n");
+}
+
 TEST_F(PocdMapInput, TruncatedDepthImageIsSkipped) {
   const std::filesystem::path file = frame_file(in_, 2, ".depth.png");
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);

@@ -75,7 +75,7 @@ SitePublisher::SitePublisher(Site& site, const NodeFile& config, const dds::BusO
       participant_(std::make_shared<dds::Participant>(bus)),
       objects_(participant_, config_, kEpoch),
       map_(participant_, config_, kEpoch, wakeup_),
-      status_(participant_, "costs", kEpoch, 1.0),
+      status_(participant_, "costs", kEpoch, RosOutputConfig{}),
       outputs_(participant_, config_, kEpoch),
       snapshots_(site.pipeline().objects()) {}
 

@@ -2,6 +2,10 @@
 #include <gtest/gtest.h>
 #include <sys/file.h>
 
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+
 #include "robot_sender.hpp"
 
 namespace pocd {
@@ -116,18 +120,43 @@ TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
   ImageWriter bare(bus, dds::topics::kDepth, "robot1/depth/image_raw", kTestDelivery);
   ImageWriter other(bus, dds::topics::kDepth, "rt/robot1/front/depth/image_rect_raw",
                     kTestDelivery);
-  Process doctor(machine.command(
-      domain, {"--listen", "600", "--verbose", "--robot", "robot1", "--robot", "robot2"}));
-  const CommandResult result = ask(doctor, [](StampNs) {},
-                                   {"robot1/depth/image_raw: is announced",
-                                    "rt/robot1/front/depth/image_rect_raw: is announced"});
+  using namespace eprosima::fastdds::dds;  // NOLINT: our own writers are in no partition
+  const auto use = bus->topic("rt/robot3/depth/image_raw",
+                              TypeSupport(new dds::GuardedType<sensor_msgs::msg::ImagePubSubType>));
+  PublisherQos partition;
+  partition.partition().push_back("cameras");
+  Publisher* publisher = bus->get()->create_publisher(partition);
+  DataWriter* apart = publisher->create_datawriter(use.get(), DATAWRITER_QOS_DEFAULT);
+  ASSERT_NE(apart, nullptr);
+  Process doctor(machine.command(domain, {"--listen", "600", "--verbose", "--robot", "robot1",
+                                          "--robot", "robot2", "--robot", "robot3"}));
+  const CommandResult result = ask(
+      doctor, [](StampNs) {},
+      {"robot1/depth/image_raw: is announced", "rt/robot1/front/depth/image_rect_raw: is announced",
+       "rt/robot3/depth/image_raw: is announced"});
+  publisher->delete_datawriter(apart);
+  bus->get()->delete_publisher(publisher);
   EXPECT_EQ(result.exit_code, 1);
   for (const char* part :
        {"there is robot1/depth/image_raw, without rt/",
+        "is in the partition \"cameras\": not heard",
         "image topics are: robot1/depth/image_raw, rt/robot1/front/depth/image_rect_raw",
         "--set 'node.topics.depth="}) {
     EXPECT_NE(result.out.find(part), std::string::npos) << part << "\n" << result.out;
   }
+}
+
+// Such as those of Cyclone DDS.
+TEST(Doctor, ParticipantsWithoutANameAreThere) {
+  const TestDomain domain;
+  const Machine machine;
+  const dds::Participant nameless({domain.number(), "", ""});
+  CommandResult result;
+  EXPECT_TRUE(eventually([&] {
+    result = run_command(machine.command(domain, {"--listen", "1"}));
+    return result.out.find("participants: one without a name") != std::string::npos;
+  })) << result.out;
+  EXPECT_EQ(result.out.find("nobody else is there"), std::string::npos) << result.out;
 }
 
 TEST(Doctor, SuggestsAConfigurationThatFits) {

@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include "diagnostic_msgsPubSubTypes.h"
 #include "robot_sender.hpp"
 #include "whole_run.hpp"
 
@@ -78,6 +79,70 @@ TEST(Fleet, DiscoveredRobotsLiveEqualOffline) {
   const std::string said =
       play_and_compare(domain, node, play_command(domain, {"--max-frames", "40"}, demo), expected);
   EXPECT_NE(said.find("40 frames processed"), std::string::npos) << said;
+}
+
+// Fast DDS 2.9 does not hear the goodbye of a Cyclone publisher whose process goes on: its images
+// end, and it is there. That is noticed by its silence.
+TEST(Fleet, ARobotThatFallsSilentIsSaidToBe) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  dds::Wakeup wakeup;
+  dds::Reader<diagnostic_msgs::msg::DiagnosticArrayPubSubType> diagnostics(
+      bus, dds::topics::kDiagnostics, wakeup);
+  RobotSender robot(bus, "robot1");
+  Process node(fleet_command(
+      domain, {"--set", "node.segmentation=absent", "--set", "node.silent_wait_s=1.5"}));
+  const auto level_of_robot = [&]() -> int {
+    diagnostic_msgs::msg::DiagnosticArray array;
+    dds::SampleMeta meta;
+    int level = -1;
+    while (diagnostics.take(array, meta)) {
+      for (const auto& status : array.status()) {
+        if (status.name() == "pocd_node: robot1") level = status.level();
+      }
+    }
+    return level;
+  };
+  StampNs stamp_ns = 0;
+  ASSERT_TRUE(eventually([&] {
+    robot.send_frame(stamp_ns += 33 * kMs);
+    return level_of_robot() == 0 && health.newest() != nullptr &&
+           health.newest()->frames_processed() > 0;
+  })) << node.err();
+  EXPECT_TRUE(eventually([&] { return level_of_robot() == 1; })) << "silence is a warning";
+  EXPECT_TRUE(eventually([&] {
+    const auto* said = health.newest();
+    return said != nullptr && said->robots().size() == 1 && said->robots()[0].present() &&
+           said->robots()[0].waiting_for().find("has sent no depth image for") != std::string::npos;
+  }));
+  EXPECT_TRUE(eventually([&] {
+    robot.send_frame(stamp_ns += 33 * kMs);
+    return level_of_robot() == 0;
+  })) << "and it is over when images come again";
+}
+
+// What is asked for reliably comes again when the network loses it; who offers less is named.
+TEST(Fleet, SmallInputsCanBeAskedForReliably) {
+  for (const bool reliably : {false, true}) {
+    const TestDomain domain;
+    const auto bus = test_participant(domain);
+    HealthWatch health(bus);
+    dds::Writer<sensor_msgs::msg::ImagePubSubType> depth(
+        bus, dds::topics::kDepth, "rt/robot1/depth/image_raw", dds::topics::best_effort(5));
+    dds::Writer<sensor_msgs::msg::CameraInfoPubSubType> info(
+        bus, dds::topics::kCameraInfo, "rt/robot1/depth/camera_info", dds::topics::best_effort(5));
+    TransformSender tf(bus, dds::topics::kTf);  // reliable
+    Process node(fleet_command(domain, {"--set", std::string("node.reliable_tf_and_info=") +
+                                                     (reliably ? "true" : "false")}));
+    ASSERT_TRUE(eventually([&] { return depth.matched() > 0 && tf.matched(); })) << node.err();
+    EXPECT_TRUE(eventually([&] {
+      const bool refused = health.problem("rt/robot1/depth/camera_info", "incompatible_qos") == 1;
+      return reliably ? refused && info.matched() == 0 : info.matched() > 0;
+    })) << reliably
+        << node.err();
+    EXPECT_EQ(health.problem("rt/robot1/depth/image_raw", "incompatible_qos"), 0u);
+  }
 }
 
 // Nothing ever comes on a segmentation topic that is announced and required.

@@ -4,6 +4,7 @@
 #include "lossy_link.hpp"
 #include "map_source.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
+#include "robot_sender.hpp"
 
 namespace pocd {
 namespace {
@@ -81,6 +82,25 @@ TEST_P(LossyNetwork, ObjectsAndMapConverge) {
       << result.out;
   EXPECT_NE(result.out.find(" 70 objects"), std::string::npos) << result.out;
   EXPECT_GT(link.lost_there(), 0u) << "nothing was tested";
+}
+
+// Images are best effort: what the network loses does not come again.
+TEST(LossyNetworkImages, WhatIsLostIsNamedAndRaisesTheLevel) {
+  const LossyLink link(0.1);
+  if (!link.problem().empty()) GTEST_SKIP() << link.problem();
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  HealthWatch health(bus);
+  RobotSender robot(bus, "robot1");
+  Process node(link.over_there(node_command(domain, {"--set", "node.segmentation=absent"})));
+  ASSERT_TRUE(eventually([&] { return health.newest() != nullptr && robot.matched(); }))
+      << node.err();
+  StampNs stamp_ns = 0;
+  EXPECT_TRUE(eventually([&] {
+    robot.send_frame(stamp_ns += 33'000'000);
+    return health.problem(robot.depth_topic(), "images_lost") > 0 && health.newest()->level() == 1;
+  })) << node.err();
+  EXPECT_NE(node.err().find("images_lost"), std::string::npos) << node.err();
 }
 
 INSTANTIATE_TEST_SUITE_P(Rates, LossyNetwork,

@@ -83,7 +83,7 @@ TEST(Intake, KeepsEveryStaticTransformOfAFleet) {
   const TestDomain domain;
   const auto bus = test_participant(domain), other = test_participant(domain);
   dds::Wakeup wakeup;
-  dds::TransformInput input(bus, "rt/tf", "rt/tf_static", false, wakeup);
+  dds::TransformInput input(bus, "rt/tf", "rt/tf_static", dds::topics::kTf.delivery, wakeup);
   using Writer = dds::Writer<tf2_msgs::msg::TFMessagePubSubType>;
   std::vector<std::unique_ptr<Writer>> broadcasters;
   for (int i = 0; i < kBroadcasters; ++i) {

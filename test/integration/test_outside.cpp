@@ -6,6 +6,32 @@
 namespace pocd {
 namespace {
 
+// Those who follow the map need none of what only the data sets are read with.
+TEST(Outside, ThePackagesAreFoundWithoutPclVtkAndQt) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "CMakeLists.txt")
+      << "cmake_minimum_required(VERSION 3.22)\nproject(user LANGUAGES CXX)\n"
+         "find_package(pocd_core REQUIRED)\nfind_package(pocd_dds REQUIRED)\n"
+         "foreach(name PCL VTK Qt5 Qt5Core Qt6)\n"
+         "  get_property(looked GLOBAL PROPERTY PACKAGES_FOUND)\n"
+         "  get_property(failed GLOBAL PROPERTY PACKAGES_NOT_FOUND)\n"
+         "  if(name IN_LIST looked OR name IN_LIST failed)\n"
+         "    message(FATAL_ERROR \"looked for ${name}\")\n  endif()\nendforeach()\n";
+  std::vector<std::string> command{POCD_CMAKE,
+                                   "-S",
+                                   folder.path().string(),
+                                   "-B",
+                                   (folder.path() / "build").string(),
+                                   "-G",
+                                   POCD_GENERATOR,
+                                   std::string("-DCMAKE_PREFIX_PATH=") + POCD_BIN_DIR + "/.."};
+  for (const char* name : {"PCL", "VTK", "Qt5", "Qt6"}) {
+    command.push_back(std::string("-DCMAKE_DISABLE_FIND_PACKAGE_") + name + "=ON");
+  }
+  const CommandResult configured = run_command(command);
+  EXPECT_EQ(configured.exit_code, 0) << configured.out << configured.err;
+}
+
 TEST(Outside, ExampleBuildsAgainstTheInstalledPackageAndFollowsTheMap) {
   const TemporaryFolder folder;
   const std::string build = (folder.path() / "build").string();

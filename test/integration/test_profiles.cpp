@@ -122,6 +122,35 @@ TEST(Participant, ATopicGoesWithItsLastUser) {
   bus->publisher()->delete_datawriter(left);
 }
 
+// What says nothing of sizes has the kernel's: most images of a robot are lost then.
+TEST(Profiles, BuffersThatTheyLeaveSmallAreNamed) {
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto says_so = [&](const std::string& sizes) {
+    const auto file = folder.path() / "profiles.xml";
+    std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
+  <transport_descriptors><transport_descriptor>
+    <transport_id>udp</transport_id><type>UDPv4</type>)"
+                        << sizes << R"(
+  </transport_descriptor></transport_descriptors>
+  <participant profile_name="udp" is_default_profile="true"><rtps>
+    <userTransports><transport_id>udp</transport_id></userTransports>
+    <useBuiltinTransports>false</useBuiltinTransports>
+  </rtps></participant></profiles></dds>)";
+    Process node(node_command(domain, {"--profiles", file.string()}));
+    EXPECT_TRUE(eventually([&] {
+      return node.err().find("running on domain") != std::string::npos;
+    })) << node.err();
+    return node.err().find("set receiveBufferSize and sendBufferSize") != std::string::npos;
+  };
+  EXPECT_TRUE(says_so(""));
+  EXPECT_TRUE(says_so("<receiveBufferSize>65536</receiveBufferSize>"));
+  EXPECT_FALSE(
+      says_so("<sendBufferSize>4194304</sendBufferSize>"
+              "<receiveBufferSize>4194304</receiveBufferSize>"));
+}
+
 TEST(SocketBuffers, SayWhatToSetWhenTheyAreSmall) {
   EXPECT_EQ(dds::socket_buffer_problem(4096), "");
   const std::string problem = dds::socket_buffer_problem(1 << 30);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "pocd/common/check.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/bridge/ros_messages.hpp"
@@ -160,6 +161,50 @@ TEST(OccupancyProjection, FarTileDoesNotEatAllMemory) {
   EXPECT_TRUE(projection.update()) << "what made it too large has gone";
   EXPECT_FALSE(projection.too_large());
   EXPECT_EQ(cell(projection, 0, 0), kCellOccupied);
+}
+
+TEST(OccupancyProjection, AFixedExtentHasItsSizeFromTheStart) {
+  OccupancyOptions fixed = options();
+  fixed.extent = cells_around(-1.25, -0.5, 2.0, 1.0, kVoxelM);
+  EXPECT_EQ(fixed.extent.x, -13) << "outwards";
+  EXPECT_EQ(fixed.extent.y, -5) << "what lies on an edge needs no further cell";
+  EXPECT_EQ(fixed.extent.width, 33u);
+  EXPECT_EQ(fixed.extent.height, 15u);
+  OccupancyProjection projection(fixed);
+  EXPECT_TRUE(projection.update()) << "before there is a map";
+  EXPECT_EQ(projection.grid().cells, std::vector<std::int8_t>(33 * 15, kCellUnknown));
+  EXPECT_FALSE(projection.update());
+
+  SmallMap map;
+  map.set(-13, -5, 5, 0.02), map.set(19, 9, 5, 0.02);  // its corners
+  map.publish_to(projection);
+  EXPECT_FALSE(projection.update());
+  EXPECT_FALSE(projection.cut());
+  ASSERT_TRUE(projection.changed_rectangle());
+  EXPECT_EQ(projection.changed_rectangle()->width, 33u);
+  EXPECT_EQ(projection.changed_rectangle()->height, 15u);
+  EXPECT_EQ(cell(projection, -13, -5), kCellOccupied);
+  EXPECT_EQ(cell(projection, 19, 9), kCellOccupied);
+
+  map.set(-14, 0, 5, 0.02), map.set(10'000'000, 0, 5, 0.02);
+  map.publish_to(projection);
+  EXPECT_FALSE(projection.update()) << "it does not grow";
+  EXPECT_TRUE(projection.cut());
+  EXPECT_FALSE(projection.too_large());
+  EXPECT_FALSE(projection.changed_rectangle());
+  EXPECT_EQ(projection.grid().width, 33u);
+  EXPECT_THROW(cells_around(-1e4, -1e4, 1e4, 1e4, kVoxelM), InputError);
+}
+
+// Nav2's static layer warns of anything else, and counts cells with the resolution as it is sent.
+TEST(GridMessage, OriginIsAMultipleOfTheResolutionAsItIsSent) {
+  CellRectangle grid{-123'457, 98'765, 1, 1, {0}};
+  for (const double resolution_m : {0.05, 0.1, 0.02, 0.03}) {
+    const auto message = grid_message(grid, resolution_m, 0, "map");
+    const double sent_m = message.info().resolution();
+    EXPECT_EQ(message.info().origin().position().x() / sent_m, grid.x) << resolution_m;
+    EXPECT_EQ(message.info().origin().position().y() / sent_m, grid.y) << resolution_m;
+  }
 }
 
 /// All points of a map that is taken over tile by tile, in steps, and at once.

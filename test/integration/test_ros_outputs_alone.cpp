@@ -2,15 +2,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
 #include "full_writers.hpp"
+#include "map_msgsPubSubTypes.h"
 #include "map_source.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "over_the_bus.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/node/ros_outputs.hpp"
+#include "renamed_reader.hpp"
 #include "rmf_obstacle_msgsPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"
@@ -116,6 +119,111 @@ TEST(RosOutputsAlone, ObstaclesAreRefreshedInTimeAndGoByLapse) {
   EXPECT_EQ(marker_messages, 50) << "five times a second";
   // The component has gone: the manager forgets all within the lifetime.
   for (const auto& [id, end_ns] : ends_ns) EXPECT_LE(end_ns, stamp(9.95 + 1.25)) << id;
+}
+
+// Both have one name on the bus: a reader of either release is matched by whatever is sent, and
+// reads what the setting says.
+TEST(RosOutputsAlone, ObstaclesHaveTheFormOfTheRelease) {
+  RosOutputConfig rates;
+  rates.markers_hz = rates.occupancy_hz = rates.surface_hz = 0.0;
+  rates.ros_release = "humble";
+  OutputsInSimulatedTime humble(rates);
+  rates.ros_release = "iron";
+  OutputsInSimulatedTime iron(rates);
+  dds::Wakeup wakeup;
+  // One participant has one form of a type.
+  RenamedReader<rmf_obstacle_msgs::msg::ObstaclesHumblePubSubType> humble_reader(
+      test_participant(humble.domain), dds::topics::kRmfObstacles, wakeup);
+  dds::Reader<rmf_obstacle_msgs::msg::ObstaclesPubSubType> iron_reader(
+      test_participant(iron.domain), dds::topics::kRmfObstacles, wakeup);
+  rmf_obstacle_msgs::msg::ObstaclesHumble humble_list;
+  rmf_obstacle_msgs::msg::Obstacles iron_list;
+  dds::SampleMeta meta;
+  humble.put(7), iron.put(7);
+  double second = 0.0;
+  ASSERT_TRUE(eventually([&] {  // best effort: until the first one arrives
+    humble.at(second += 1.0), iron.at(second);
+    const bool humble_heard =
+        !humble_list.obstacles().empty() || humble_reader.take(humble_list, meta);
+    const bool iron_heard = !iron_list.obstacles().empty() || iron_reader.take(iron_list, meta);
+    return humble_heard && iron_heard;
+  }));
+  EXPECT_EQ(humble_reader.take_damaged() + iron_reader.take_damaged(), 0u);
+  EXPECT_EQ(iron_list.header().frame_id(), "map");
+  for (const auto* list : {&humble_list.obstacles(), &iron_list.obstacles()}) {
+    ASSERT_EQ(list->size(), 1u);
+    EXPECT_EQ(list->front().id(), 7);
+    EXPECT_EQ(list->front().header().frame_id(), "map");
+    EXPECT_EQ(list->front().bbox().size().x(), 1.0);
+  }
+}
+
+// Nav2's static layer loses an update that comes between a new grid and its own next cycle.
+TEST(RosOutputsAlone, TheWholeGridComesAgainAfterUpdates) {
+  RosOutputConfig rates;
+  rates.markers_hz = rates.obstacles_hz = rates.surface_hz = 0.0;
+  rates.occupancy_hz = 1.0;
+  rates.occupancy_whole_s = 5.0;
+  OutputsInSimulatedTime node(rates);
+  dds::Wakeup wakeup;
+  dds::Reader<nav_msgs::msg::OccupancyGridPubSubType> grids(node.bus, dds::topics::kOccupancy,
+                                                            wakeup);
+  dds::Reader<map_msgs::msg::OccupancyGridUpdatePubSubType> updates(
+      node.bus, dds::topics::kOccupancyUpdates, wakeup);
+  ASSERT_TRUE(eventually([&] { return grids.matched() > 0 && updates.matched() > 0; }));
+  TsdfMap map{TsdfConfig{}};
+  MapPublisher publisher(1, TsdfConfig{});
+  Random random(3);
+  std::vector<int> whole, parts;  // seconds at which they came
+  for (int second = 1; second <= 20; ++second) {
+    if (second <= 8) {  // then it stands still
+      fill_block(map, {0, 0, 1}, random);
+      const std::optional<MapDelta> step = publisher.make_step(map);
+      ASSERT_TRUE(step);
+      publisher.take_over(*step);
+      node.tiles = publisher.tiles();
+      for (const MapTile& tile : step->changed) node.changed_tiles.insert(tile.key);
+    }
+    node.at(second);
+    dds::SampleMeta meta;
+    nav_msgs::msg::OccupancyGrid grid;
+    map_msgs::msg::OccupancyGridUpdate update;
+    // Within a participant, what was written has arrived.
+    while (grids.take(grid, meta)) whole.push_back(second);
+    while (updates.take(update, meta)) parts.push_back(second);
+  }
+  EXPECT_EQ(whole, (std::vector<int>{1, 6, 11}));
+  EXPECT_EQ(parts, (std::vector<int>{2, 3, 4, 5, 7, 8}));
+}
+
+// Nav2's static layer takes a map of another size as a new one, and resizes the costmap.
+TEST(RosOutputsAlone, AFixedExtentIsSentBeforeThereIsAMap) {
+  RosOutputConfig rates;
+  rates.markers_hz = rates.obstacles_hz = rates.surface_hz = 0.0;
+  rates.occupancy_extent = {-10.0, -5.0, 10.0, 5.0};
+  OutputsInSimulatedTime node(rates);
+  dds::Wakeup wakeup;
+  dds::Reader<nav_msgs::msg::OccupancyGridPubSubType> grids(node.bus, dds::topics::kOccupancy,
+                                                            wakeup);
+  nav_msgs::msg::OccupancyGrid grid;
+  dds::SampleMeta meta;
+  node.at(1.0);
+  ASSERT_TRUE(eventually([&] { return grids.take(grid, meta); }));
+  const double cell_m = OutputsInSimulatedTime::config(rates).pipeline.map.voxel_size_m;
+  EXPECT_EQ(grid.info().width(), std::lround(20.0 / cell_m));
+  EXPECT_EQ(grid.info().height(), std::lround(10.0 / cell_m));
+  EXPECT_NEAR(grid.info().origin().position().x(), -10.0, 1e-5);
+  EXPECT_FALSE(node.outputs.grid_cut());
+
+  TsdfMap map{TsdfConfig{}};
+  Random random(3);
+  fill_block(map, {1000, 0, 1}, random);
+  MapPublisher publisher(1, TsdfConfig{});
+  publisher.take_over(*publisher.make_step(map));
+  node.tiles = publisher.tiles();
+  for (const auto& [key, tile] : node.tiles) node.changed_tiles.insert(key);
+  node.at(3.0);
+  EXPECT_TRUE(node.outputs.grid_cut());
 }
 
 // A profile lets the writers keep one sample until it is acknowledged, and a reader has room for

@@ -20,6 +20,7 @@
 #include "map_msgs.h"
 #include "nav_msgs.h"
 #include "rmf_obstacle_msgs.h"
+#include "rmw_dds_common.h"
 #include "rosgraph_msgs.h"
 #include "sensor_msgs.h"
 #include "tf2_msgs.h"
@@ -101,6 +102,16 @@ struct Filler {
   POCD_FIELDS(rmf_obstacle_msgs::msg::Obstacle, m.header(), m.id(), m.source(), m.level_name(),
               m.classification(), m.bbox(), m.data_resolution(), m.data(), m.lifetime(), m.action())
   POCD_FIELDS(rmf_obstacle_msgs::msg::Obstacles, m.header(), m.obstacles())
+  POCD_FIELDS(rmf_obstacle_msgs::msg::ObstaclesHumble, m.obstacles())
+  POCD_FIELDS(rmw_dds_common::msg::Gid, m.data())
+  POCD_FIELDS(rmw_dds_common::msg::NodeEntitiesInfo, m.node_namespace(), m.node_name(),
+              m.reader_gid_seq(), m.writer_gid_seq())
+  POCD_FIELDS(rmw_dds_common::msg::ParticipantEntitiesInfo, m.gid(), m.node_entities_info_seq())
+  POCD_FIELDS(rmw_dds_common::msg::GidHumble, m.data())
+  POCD_FIELDS(rmw_dds_common::msg::NodeEntitiesInfoHumble, m.node_namespace(), m.node_name(),
+              m.reader_gid_seq(), m.writer_gid_seq())
+  POCD_FIELDS(rmw_dds_common::msg::ParticipantEntitiesInfoHumble, m.gid(),
+              m.node_entities_info_seq())
 
   template <class T, std::size_t N>
   void fill(std::array<T, N>& values) {
@@ -139,6 +150,7 @@ int main(int argc, char** argv) {
   }
   const std::string folder = argv[1];
   write<sensor_msgs::msg::Image>(folder, "sensor_msgs.Image");
+  write<sensor_msgs::msg::CompressedImage>(folder, "sensor_msgs.CompressedImage");
   write<sensor_msgs::msg::CameraInfo>(folder, "sensor_msgs.CameraInfo");
   write<sensor_msgs::msg::PointCloud2>(folder, "sensor_msgs.PointCloud2");
   write<nav_msgs::msg::Odometry>(folder, "nav_msgs.Odometry");
@@ -148,5 +160,10 @@ int main(int argc, char** argv) {
   write<rosgraph_msgs::msg::Clock>(folder, "rosgraph_msgs.Clock");
   write<diagnostic_msgs::msg::DiagnosticArray>(folder, "diagnostic_msgs.DiagnosticArray");
   write<visualization_msgs::msg::MarkerArray>(folder, "visualization_msgs.MarkerArray");
-  write<rmf_obstacle_msgs::msg::Obstacles>(folder, "rmf_obstacle_msgs.Obstacles");
+  write<rmf_obstacle_msgs::msg::Obstacles>(folder, "rmf_obstacle_msgs.Obstacles@iron");
+  write<rmf_obstacle_msgs::msg::ObstaclesHumble>(folder, "rmf_obstacle_msgs.Obstacles@humble");
+  write<rmw_dds_common::msg::ParticipantEntitiesInfo>(
+      folder, "rmw_dds_common.ParticipantEntitiesInfo@iron");
+  write<rmw_dds_common::msg::ParticipantEntitiesInfoHumble>(
+      folder, "rmw_dds_common.ParticipantEntitiesInfo@humble");
 }

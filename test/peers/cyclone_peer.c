@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "nav_msgs.h"
+#include "pocd_interfaces.h"
 #include "pocd_msgs.h"
 #include "sensor_msgs.h"
 #include "tf2_msgs.h"
@@ -158,10 +159,10 @@ typedef struct {
 } Alive;
 
 typedef struct {
-  dds_entity_t objects, events, tiles, deltas, manifest;
+  dds_entity_t objects, events, tiles, deltas, manifest, lists, ros_events, ros_health;
   Alive objects_alive, tiles_alive;
   uint64_t version;
-  uint32_t parts;
+  uint32_t parts, listed;
   pocd_msgs_msg_dds__MapManifest_ last;
 } Subscriber;
 
@@ -302,10 +303,44 @@ static void on_manifest(Subscriber* self, const void* sample, const dds_sample_i
   self->last.frame_id = NULL;
 }
 
+// What a subscriber of ROS 2 gets: no keys, no disposes.
+static void on_list(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
+  if (!info->valid_data) return;
+  const pocd_interfaces_msg_dds__ObjectList_* list = sample;
+  const char kind = 'L';
+  PUT(kind), PUT(list->number);
+  PUT(list->objects._length);
+  for (uint32_t i = 0; i < list->objects._length; ++i) {
+    put(list->objects._buffer[i].uuid, sizeof list->objects._buffer[i].uuid);
+  }
+  PUT(list->removed._length);
+  for (uint32_t i = 0; i < list->removed._length; ++i) {
+    put(list->removed._buffer[i].uuid, sizeof list->removed._buffer[i].uuid);
+  }
+  self->listed = list->objects._length;
+}
+
+static void on_ros_event(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
+  (void)self;
+  if (!info->valid_data) return;
+  const pocd_interfaces_msg_dds__ObjectEvent_* event = sample;
+  const char kind = 'R';
+  PUT(kind), PUT(event->seq), PUT(event->kind);
+}
+
+static void on_ros_health(Subscriber* self, const void* sample, const dds_sample_info_t* info) {
+  (void)self;
+  if (!info->valid_data) return;
+  const pocd_interfaces_msg_dds__NodeHealth_* health = sample;
+  const char kind = 'H';
+  PUT(kind), PUT(health->epoch), PUT(health->frames_processed);
+}
+
 static bool converged(const Subscriber* self) {
   return self->last.final_version && self->version == self->last.version &&
          self->tiles_alive.count == self->last.tile_count &&
-         self->objects_alive.count == self->last.object_count;
+         self->objects_alive.count == self->last.object_count &&
+         self->listed == self->last.object_count;
 }
 
 static void drain_all(Subscriber* self) {
@@ -316,6 +351,9 @@ static void drain_all(Subscriber* self) {
     more = drain(self, self->tiles, on_tile) || more;
     more = drain(self, self->deltas, on_delta) || more;
     more = drain(self, self->manifest, on_manifest) || more;
+    more = drain(self, self->lists, on_list) || more;
+    more = drain(self, self->ros_events, on_ros_event) || more;
+    more = drain(self, self->ros_health, on_ros_health) || more;
   }
 }
 
@@ -340,6 +378,10 @@ int main(int argc, char** argv) {
   all.tiles = reader(bus, &pocd_msgs_msg_dds__MapTile__desc, "pocd/map/tiles", true);
   all.deltas = reader(bus, &pocd_msgs_msg_dds__MapDelta__desc, "pocd/map/deltas", false);
   all.manifest = reader(bus, &pocd_msgs_msg_dds__MapManifest__desc, "pocd/map/manifest", true);
+  all.lists = reader(bus, &pocd_interfaces_msg_dds__ObjectList__desc, "rt/pocd/objects", true);
+  all.ros_events =
+      reader(bus, &pocd_interfaces_msg_dds__ObjectEvent__desc, "rt/pocd/object_events", false);
+  all.ros_health = reader(bus, &pocd_interfaces_msg_dds__NodeHealth__desc, "rt/pocd/health", true);
   Robot robot;
   robot.tf_static = writer(bus, &tf2_msgs_msg_dds__TFMessage__desc, "rt/tf_static", true);
   robot.odometry = writer(bus, &nav_msgs_msg_dds__Odometry__desc, "rt/robot1/odom", false);
@@ -350,12 +392,14 @@ int main(int argc, char** argv) {
 
   const dds_entity_t writers[] = {robot.tf_static, robot.odometry, robot.info, robot.labels,
                                   robot.depth};
-  const dds_entity_t readers[] = {all.objects, all.events, all.tiles, all.deltas, all.manifest};
-  for (int ready = 0; ready < 10 && !stopping; dds_sleepfor(DDS_MSECS(kPollMs))) {
+  const dds_entity_t readers[] = {all.objects,  all.events, all.tiles,      all.deltas,
+                                  all.manifest, all.lists,  all.ros_events, all.ros_health};
+  enum { kWriters = sizeof writers / sizeof *writers, kReaders = sizeof readers / sizeof *readers };
+  for (int ready = 0; ready < kWriters + kReaders && !stopping; dds_sleepfor(DDS_MSECS(kPollMs))) {
     ready = 0;
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < kWriters; ++i) ready += matched(writers[i]) > 0;
+    for (int i = 0; i < kReaders; ++i) {
       dds_subscription_matched_status_t status;
-      ready += matched(writers[i]) > 0;
       ready += dds_get_subscription_matched_status(readers[i], &status) == DDS_RETCODE_OK &&
                status.current_count > 0;
     }
@@ -364,7 +408,7 @@ int main(int argc, char** argv) {
   send_mount(&robot, mount);
   int sent = 0;
   while (!stopping && send_frame(&robot, frames, size, camera)) {
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < kWriters; ++i) {
       while (!stopping && dds_wait_for_acks(writers[i], DDS_MSECS(200)) != DDS_RETCODE_OK) {
         drain_all(&all);
       }

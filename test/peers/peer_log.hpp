@@ -75,6 +75,11 @@ struct PeerLog {
   std::size_t deltas = 0, gaps = 0;
   MapDigest delta_digest, manifest_digest;
   std::uint64_t manifest_version = 0;
+  /// Of the topics for ROS 2: the newest list, the numbers of events, the newest health.
+  std::uint64_t list_number = 0;
+  std::vector<Uuid> listed, removed;
+  std::vector<std::uint64_t> ros_events;
+  std::uint64_t health_epoch = 0, health_frames = 0;
   bool converged = false;
   /// After "converged", when the component ends.
   std::size_t ended_disposed = 0, ended_without_writers = 0;
@@ -149,6 +154,17 @@ struct PeerLog {
       manifest_version = get<std::uint64_t>();
       manifest_digest = {get<std::uint64_t>(), 0};
       manifest_digest.high = get<std::uint64_t>();
+    } else if (kind == 'L') {
+      list_number = get<std::uint64_t>();
+      listed.clear(), removed.clear();
+      for (auto n = get<std::uint32_t>(); n > 0; --n) listed.push_back(get<Uuid>());
+      for (auto n = get<std::uint32_t>(); n > 0; --n) removed.push_back(get<Uuid>());
+    } else if (kind == 'R') {
+      ros_events.push_back(get<std::uint64_t>());
+      get<std::uint8_t>();  // its kind
+    } else if (kind == 'H') {
+      health_epoch = get<std::uint64_t>();
+      health_frames = get<std::uint64_t>();
     } else {
       throw std::runtime_error("the peer's log has an unknown record");
     }

@@ -2,6 +2,7 @@
 // interface only; and what a protocol analyser says about the packets.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <sstream>
@@ -41,8 +42,9 @@ class Cyclone : public testing::Test {
     const TestDomain domain;
     std::unique_ptr<Process> capture = start_capture(domain, folder / "capture.pcapng");
     std::ofstream(folder / "udp.xml") << kUdpOnly;
-    Process node(node_command(
-        domain, {"--lossless", "--epoch", "77", "--profiles", (folder / "udp.xml").string()}));
+    Process node(
+        node_command(domain, {"--lossless", "--epoch", "77", "--profiles",
+                              (folder / "udp.xml").string(), "--set", "node.outputs.twins_hz=20"}));
     Process peer({POCD_CYCLONE_PEER, domain.text(), (folder / "frames").string(),
                   (folder / "log").string()});
     const auto said = [&](const std::string& text) {
@@ -131,6 +133,22 @@ TEST_F(Cyclone, EventsArriveInOrderWithoutAGap) {
     if (log_->events[i].kind == 0) ++added;
   }
   EXPECT_EQ(added, expected_.objects + expected_.removed);
+}
+
+// By the types' names in pocd_interfaces and without keys, as rmw_cyclonedds_cpp would.
+TEST_F(Cyclone, ReadersLikeThoseOfRos2GetObjectsRemovalsEventsAndHealth) {
+  EXPECT_GT(log_->list_number, 1u);
+  std::vector<PeerLog::Uuid> present;
+  for (const auto& [uuid, id] : log_->objects) present.push_back(uuid);
+  std::sort(log_->listed.begin(), log_->listed.end());
+  EXPECT_EQ(log_->listed, present);
+  EXPECT_EQ(std::multiset<PeerLog::Uuid>(log_->removed.begin(), log_->removed.end()),
+            std::multiset<PeerLog::Uuid>(log_->disposed.begin(), log_->disposed.end()));
+  std::vector<std::uint64_t> numbers;
+  for (const PeerLog::Event& event : log_->events) numbers.push_back(event.seq);
+  EXPECT_EQ(log_->ros_events, numbers);
+  EXPECT_EQ(log_->health_epoch, 77u);
+  EXPECT_EQ(log_->health_frames, static_cast<std::uint64_t>(frames_));
 }
 
 // The same frames give the same map through either vendor's middleware as offline, bit by bit, and

@@ -239,6 +239,57 @@ TEST(RecordReplay, UnknownTypesPartitionsAndDisposesComeBack) {
   EXPECT_NE(channels.at("keyed")->metadata.at("qos").find("keyed: true"), std::string::npos);
 }
 
+// ROS 2's own bookkeeping and services: played again, they would make nodes that are not there.
+TEST(RecordReplay, TheGraphOfRos2IsLeftOutUnlessItIsNamed) {
+  const Folder folder;
+  {
+    recording::McapWriter writer(folder / "first.mcap");
+    const auto schema = writer.add_schema("foreign::Thing", "", "");
+    for (const char* topic : {"ros_discovery_info", "rq/askRequest", "rr/askReply", "plain"}) {
+      const auto channel = writer.add_channel(
+          schema, topic, "cdr",
+          {{"qos", "reliability: true\ndurability: true\nownership: false\nkeyed: false"},
+           {"ros2-types", "false"},
+           {"partitions", ""}});
+      const Bytes bytes{0, 1, 0, 0, 1, 2, 3, 4};
+      // Ten seconds, in which everybody hears of them.
+      for (const std::uint64_t time_ns : {1'000'000'000ull, 11'000'000'000ull}) {
+        writer.write({channel, 0, time_ns, time_ns}, bytes.data(), bytes.size());
+      }
+    }
+    writer.close();
+  }
+  // The other one got them, so the bus had them when this one left them out.
+  Process usual({command("pocd_record"), "--output", (folder / "usual.mcap").string()});
+  Process asked({command("pocd_record"), "--output", (folder / "asked.mcap").string(), "--topic",
+                 "ros_discovery_info", "--topic", "r?/*", "--topic", "plain"});
+  ASSERT_TRUE(says(usual, "recording on domain") && says(asked, "recording on domain"));
+  const std::vector<std::string> play{command("pocd_play"),
+                                      (folder / "first.mcap").string(),
+                                      "--fast",
+                                      "--lossless",
+                                      "--wait-for",
+                                      "plain"};
+  const CommandResult played = run_command(play);
+  EXPECT_NE(played.out.find("2 messages"), std::string::npos) << played.out << played.err;
+  Process player({command("pocd_play"), (folder / "first.mcap").string(), "--lossless",
+                  "--wait-for", "ros_discovery_info", "--wait-for", "r?/*", "--topics", "*"});
+  for (const char* topic : {"ros_discovery_info", "rq/askRequest", "rr/askReply"}) {
+    EXPECT_TRUE(says(usual, std::string(topic) + ": is left out (--topic records it)"));
+  }
+  const CommandResult played_all = player.wait();
+  EXPECT_NE(played_all.out.find("8 messages"), std::string::npos)
+      << played_all.out << played_all.err;
+  stop(usual), stop(asked);
+  const ByTopic usual_topics = payloads(folder / "usual.mcap");
+  ByTopic asked_topics = payloads(folder / "asked.mcap");
+  EXPECT_EQ(usual_topics.size(), 1u);
+  EXPECT_EQ(usual_topics.count("plain"), 1u);
+  for (const char* topic : {"ros_discovery_info", "rq/askRequest", "rr/askReply", "plain"}) {
+    EXPECT_GE(asked_topics[topic].size(), 1u) << topic;
+  }
+}
+
 TEST(RecordReplay, AKilledRecorderLeavesAReadableFile) {
   const Folder folder;
   Process recorder({command("pocd_record"), "--output", (folder / "killed.mcap").string()});

@@ -12,6 +12,22 @@
 
 namespace pocd {
 
+/// A rectangle on the ground, map frame; all 0: none.
+struct GridExtentConfig {
+  double min_x_m = 0.0, min_y_m = 0.0, max_x_m = 0.0, max_y_m = 0.0;
+
+  bool given() const { return max_x_m > min_x_m && max_y_m > min_y_m; }
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("min_x_m", min_x_m, Range{-100'000, 100'000}, "Left edge, map frame [m].");
+    visit("min_y_m", min_y_m, Range{-100'000, 100'000}, "Lower edge [m].");
+    visit("max_x_m", max_x_m, Range{-100'000, 100'000}, "Right edge [m].");
+    visit("max_y_m", max_y_m, Range{-100'000, 100'000}, "Upper edge [m].");
+  }
+  std::vector<std::string> inconsistencies() const;
+};
+
 /// Rates of the topics for others; 0 switches one off.
 struct RosOutputConfig {
   double markers_hz = 1.0;
@@ -20,14 +36,18 @@ struct RosOutputConfig {
   double surface_hz = 0.5;
   double obstacles_hz = 1.0;
   double diagnostics_hz = 1.0;
+  double twins_hz = 0.0;
   double occupancy_low_m = 0.1;
   double occupancy_high_m = 2.0;
   int occupancy_not_looked_at = -1;
+  GridExtentConfig occupancy_extent;
   int surface_points = 2'000'000;
   double obstacle_lifetime_s = 3.0;
   double rate_mb_s = 10.0;
   std::string topic_namespace = "pocd";
   std::string level_name = "L1";
+  std::string ros_release = "iron";
+  std::string ros_node = "";
 
   template <class Visitor>
   void describe(Visitor& visit) {
@@ -42,6 +62,12 @@ struct RosOutputConfig {
           "rt/pocd/surface, while it has subscribers and when the map has changed; 0: off [1/s].");
     visit("obstacles_hz", obstacles_hz, Range{0.0, 20.0}, "rt/rmf_obstacles; 0: off [1/s].");
     visit("diagnostics_hz", diagnostics_hz, Range{0.0, 1.0}, "rt/diagnostics; 0: off [1/s].");
+    visit("twins_hz", twins_hz, Range{0.0, 20.0},
+          "rt/pocd/objects (all objects, when one has changed), and with it rt/pocd/object_events "
+          "and "
+          "rt/pocd/health: the topics without rt/ for ROS 2, with messages of pocd_interfaces; 0: "
+          "off "
+          "[1/s].");
     visit("occupancy_low_m", occupancy_low_m, Range{-100, 100},
           "Lower end of the heights where a surface makes a cell of the grid occupied [m].");
     visit("occupancy_high_m", occupancy_high_m, Range{-100, 100},
@@ -49,6 +75,10 @@ struct RosOutputConfig {
     visit("occupancy_not_looked_at", occupancy_not_looked_at, Range{-2, 100},
           "Value of a cell that is known from the memory and not looked at since the node started; "
           "-1: unknown, -2: as it was.");
+    visit.group(
+        "occupancy_extent", occupancy_extent,
+        "What rt/pocd/map shows, to whole cells outwards, from the start on; all 0: what the "
+        "map covers, growing with it.");
     visit("surface_points", surface_points, Range{1000, 50'000'000},
           "Most points of rt/pocd/surface; a larger surface is thinned.");
     visit("obstacle_lifetime_s", obstacle_lifetime_s, Range{0.1, 600.0},
@@ -60,6 +90,14 @@ struct RosOutputConfig {
           "Takes the place of pocd in the names of these topics, but for rt/rmf_obstacles and "
           "rt/diagnostics, which several nodes may share.");
     visit("level_name", level_name, "Level of the building that the obstacles are on (Open-RMF).");
+    visit("ros_release", ros_release, Choices{{"humble", "iron"}},
+          "Release of ROS 2 that messages have the form of where releases differ: humble, or iron "
+          "and all later ones (jazzy, kilted, rolling). rt/rmf_obstacles has no header in humble, "
+          "and ros_discovery_info has longer numbers.");
+    visit(
+        "ros_node", ros_node,
+        "Name of the component as a node in the graph of ROS 2 (`ros2 node list`), such as pocd or "
+        "/site/pocd; empty: it is none.");
   }
   std::vector<std::string> inconsistencies() const;
 };
@@ -70,6 +108,7 @@ struct NodeConfig : InputConfig {
   double silent_wait_s = 10.0;
   int queue_frames = 8;
   bool lossless = false;
+  bool reliable_tf_and_info = false;
   double object_period_s = 0.1;
   double map_period_s = 0.5;
   double map_rate_mb_s = 10.0;  // half of what a wireless link of a robot carries
@@ -93,6 +132,10 @@ struct NodeConfig : InputConfig {
           "Frames waiting for the pipeline; the oldest is dropped and counted.");
     visit("lossless", lossless,
           "Reliable readers that hold the player back instead of dropping frames.");
+    visit("reliable_tf_and_info", reliable_tf_and_info,
+          "Ask for tf, odometry and camera info reliably, so that what the network loses comes "
+          "again; "
+          "a sender that offers them best effort is not heard then (incompatible_qos).");
     visit("object_period_s", object_period_s, Range{0.0, 60.0},
           "Least time between two samples of one object [s].");
     visit("map_period_s", map_period_s, Range{0.0, 60.0}, "Least time between two map deltas [s].");
