@@ -329,7 +329,7 @@ NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
                             const std::string& word) {
   HealthSigns signs;
   signs.write_failures = work.write_failures;
-  signs.output_failures = outputs.failures() + draws_failed + graph.failures();
+  signs.output_failures = outputs.failures() + draws_failed + graph->failures();
   for (const auto& [topic, count] : outputs.broken()) signs.output_failures += count;
   for (const auto& entry : input.problems) signs.problems += entry.count;
   signs.dropped = queue.dropped();
