@@ -13,6 +13,8 @@ constexpr std::size_t kPartBytes = 64 * 1024;
 constexpr std::chrono::seconds kLongestReply{5};
 constexpr int kMostRequests = 100;  // taken in one turn
 constexpr std::chrono::milliseconds kTurn{5};
+/// A turn of sending ends after this time: the thread has a state to tell and questions to answer.
+constexpr std::chrono::milliseconds kLongestTurn{50};
 
 template <class Message>
 std::size_t payload_bytes(const Message& message) {
@@ -101,7 +103,8 @@ void MapPublication::send_step(std::optional<MapDelta> step, StampNs stamp_ns) {
 
 void MapPublication::send_waiting() {
   const auto time = std::chrono::steady_clock::now();
-  while (budget_.open(time) && (send_delta() || send_tile() || send_reply())) {
+  while (budget_.open(time) && (send_delta() || send_tile() || send_reply()) &&
+         std::chrono::steady_clock::now() - time < kLongestTurn) {
   }
 }
 
