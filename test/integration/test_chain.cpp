@@ -18,6 +18,7 @@ class ObjectLog {
       : states_(bus, dds::topics::kObjects, taker_.wakeup()), behind_(bus) {
     taker_.start([this] { take(); });
   }
+  ~ObjectLog() { stop(); }  // before the readers go
   void stop() { taker_.stop(); }
   /// From here on every state is heard: a node whose health has come in by a reader that was made
   /// later has found this one, too.

@@ -157,23 +157,20 @@ TEST(MapBus, EventsAndDeltasOvertakeTheTiles) {
 // Without subscribers nothing holds the writers back. What sends has more to do than to send tiles:
 // it tells the node's state and answers.
 TEST(MapBus, ATurnEndsHoweverMuchIsWaiting) {
-  constexpr int kSide = 200;  // blocks
+  constexpr int kSide = 160;  // blocks: 100 MB of tiles
   const TestDomain domain;
   MapSource source(domain, 5, 100.0);
   for (int x = 0; x < kSide; ++x) {
-    for (int y = 0; y < kSide; ++y) {
-      VoxelBlock& block = source.map.touch({x, y, 0});
-      block.tsdf.fill(1000);
-      block.weight.fill(10);
-    }
+    for (int y = 0; y < kSide; ++y) fill_block(source.map, {x, y, 0}, source.random);
   }
   source.publish();
+  const std::size_t tiles = source.publication.traffic().tiles;
+  EXPECT_EQ(tiles, kSide * kSide / 4u);
   EXPECT_GT(source.publication.waiting(), 0u) << "all of it went in one turn";
   EXPECT_TRUE(eventually([&] {
     source.turn();
     return source.publication.waiting() == 0;
   }));
-  EXPECT_EQ(source.publication.traffic().tiles, kSide * kSide / 4u);
 }
 
 TEST(ByteBudget, SpendsItsRateAndSavesLittle) {

@@ -35,6 +35,7 @@ class Tool {
         diagnostics_(bus, dds::topics::kDiagnostics, taker_.wakeup()) {
     taker_.start([this] { take(); });
   }
+  ~Tool() { stop(); }  // before the readers go
   void stop() { taker_.stop(); }
   /// How many of its topics have a writer.
   int matched() const {

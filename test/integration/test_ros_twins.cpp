@@ -106,6 +106,8 @@ class RosNode {
         healths_(bus, dds::topics::kRosHealth, taker_.wakeup(), "rt/" + in + "/health") {
     taker_.start([this] { take(); });
   }
+  // The readers go before the thread that takes from them.
+  ~RosNode() { stop(); }
   int matched() const {
     return (lists_.matched() > 0) + (events_.matched() > 0) + (healths_.matched() > 0);
   }
