@@ -25,7 +25,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Of all threads: the simulator has several.
 /// A line on the terminal that renews itself a few times per second.
 class Progress {
  public:

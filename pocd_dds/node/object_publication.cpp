@@ -1,8 +1,8 @@
 #include "pocd_dds/node/object_publication.hpp"
 
-#include "pocd_dds/bridge/geometry_messages.hpp"
-
 #include <utility>
+
+#include "pocd_dds/bridge/geometry_messages.hpp"
 
 namespace pocd::dds {
 

@@ -66,9 +66,9 @@ void BM_PublishAndMesh(benchmark::State& state) {
   for (auto _ : state) {
     for (const BlockKey& key : map.sorted_keys()) map.touch(key);
     MapPublisher publisher(1, config);
-    const double start = bench::clock_ms(CLOCK_PROCESS_CPUTIME_ID);
+    const double start = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
     publisher.update(map);
-    publish_ms = bench::clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start;
+    publish_ms = clock_ms(CLOCK_PROCESS_CPUTIME_ID) - start;
     triangles = extract_mesh(map, config.min_publish_weight, pool).triangles.size();
     tiles = publisher.tiles().size();
     bytes = 0;

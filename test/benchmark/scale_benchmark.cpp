@@ -1,6 +1,5 @@
 // pocd_scale: what a frame costs in a small map and in a large one, in turns, and what a square
 // metre of map takes.
-#include <time.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +11,7 @@
 
 #include "heap_counter.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/cpu_time.hpp"
 #include "pocd/map/map_io.hpp"
 #include "pocd/map/mesh.hpp"
 #include "scale_halls.hpp"
@@ -20,12 +20,6 @@ namespace pocd::benchmark {
 namespace {
 
 constexpr double kMegabyte = 1024.0 * 1024.0;
-
-double cpu_ms() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 
 double quantile(std::vector<double> values, double q) {
   const auto at = values.begin() +
@@ -51,11 +45,11 @@ std::uint64_t visits(const Site& site) {
 void measure(Site& site, const Frame& frame, Cost& cost) {
   const std::uint64_t visited = visits(site);
   const HeapCount heap = heap_count();
-  const double start = cpu_ms();
+  const double start = thread_cpu_ms();
   site.process(frame);
-  const double between = cpu_ms();
+  const double between = thread_cpu_ms();
   site.publish();
-  const double end = cpu_ms();
+  const double end = thread_cpu_ms();
   cost.frame_ms.push_back(between - start);
   cost.publish_ms.push_back(end - between);
   cost.heap_calls.push_back(static_cast<double>(heap_count().calls - heap.calls));
@@ -156,12 +150,12 @@ void run(const std::vector<double>& areas_m2, int budget_mb, double budget_area_
     const int halls = std::max(1, static_cast<int>(std::lround(area_m2 / kHallArea_m2)));
     char name[80];
     std::snprintf(name, sizeof name, "%.0f m2%s", halls * kHallArea_m2, what.c_str());
-    const double start = cpu_ms();
+    const double start = thread_cpu_ms();
     sites.emplace_back(c, halls, build);
     costs.emplace_back();
     costs.back().name = name;
     std::fprintf(stderr, "%s: %d halls mapped in %.0f s of CPU time\n", name, halls,
-                 1e-3 * (cpu_ms() - start));
+                 1e-3 * (thread_cpu_ms() - start));
   };
   for (const double area_m2 : areas_m2) add(config, area_m2, "");
   if (budget_mb > 0) {

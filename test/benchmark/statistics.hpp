@@ -1,19 +1,14 @@
 // Clocks and order statistics of the benchmark.
 #pragma once
 
-#include <time.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
+#include "pocd/common/cpu_time.hpp"
+
 namespace pocd::bench {
 
-inline double clock_ms(clockid_t clock) {
-  timespec t;
-  clock_gettime(clock, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
 inline double wall_ms() { return clock_ms(CLOCK_MONOTONIC); }
 
 /// The value below which `share` of the values lie; 0 without values.

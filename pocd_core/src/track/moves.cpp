@@ -36,6 +36,8 @@ constexpr double kFarWaitS = 1.0;
 /// thing's middle elsewhere by more than this share of its length, nothing is known of where it is.
 constexpr double kSameFit = 0.03;
 constexpr double kSlideShare = 0.25;
+/// A point of one surface, moved, is on the other one within so many voxels.
+constexpr double kOnVoxels = 1.5;
 /// Points of the new surface that are aligned.
 constexpr std::size_t kAlignPoints = 600;
 /// Of all motions that put the boxes on each other, so many are aligned: those that bring most of
@@ -117,7 +119,7 @@ std::optional<Motion> ObjectTracker::explanation(const Departure& departure,
                                                  const IcpTarget& target, const Points& source,
                                                  const IcpResult& icp) const {
   const auto all = static_cast<double>(departure.surfels.size());
-  const double inlier_m = 1.5 * config_.map.voxel_size_m;
+  const double inlier_m = kOnVoxels * config_.map.voxel_size_m;
   Motion motion;
   motion.T_new_old = icp.T_target_source.inverse();
   double moved_m = 0.0;  // of its points: what turns in place moves, too
@@ -181,7 +183,7 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   const auto& surfels = found.model.surfels();
   const std::size_t step = std::max<std::size_t>(1, surfels.size() / kAlignPoints);
   for (std::size_t i = 0; i < surfels.size(); i += step) source.push_back(surfels[i].point_W);
-  const double inlier_m = 1.5 * config_.map.voxel_size_m;
+  const double inlier_m = kOnVoxels * config_.map.voxel_size_m;
   const IcpTarget target = icp_target(departure.surfels, inlier_m,
                                       std::max(inlier_m, config_.association.icp_max_distance_m));
   IcpOptions options;

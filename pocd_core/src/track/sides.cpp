@@ -8,8 +8,8 @@
 namespace pocd {
 namespace {
 
-/// A side that departed went along with a thing that moved: at the new place, at least this share of
-/// it is seen, or it was within the thing; at most this share of what is known there is empty.
+/// A side that departed went along with a thing that moved: at the new place, at least this share
+/// of it is seen, or it was within the thing; at most this share of what is known there is empty.
 constexpr double kAlongSeenShare = 0.2;
 constexpr double kAlongEmptyShare = 0.15;
 /// Surfels of each object between which it is asked what was seen through.
@@ -48,8 +48,7 @@ double inside_share(const std::vector<Surfel>& surfels, const OrientedBox& box, 
   return static_cast<double>(inside) / static_cast<double>(surfels.size());
 }
 
-bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a,
-                                 const LibraryObject& b) const {
+bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const LibraryObject& b) const {
   if (told_apart(a, b)) return false;
   const auto sample = [](const LibraryObject& object) {
     std::vector<const Surfel*> some;
@@ -85,7 +84,7 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a,
   const auto cell_m = static_cast<float>(2.0 * config_.map.voxel_size_m);
   std::size_t crossing = 0;
   for (const Line& line : lines) {
-    const Eigen::Vector3f along = 
+    const Eigen::Vector3f along =
         (line.to->point_W - line.from->point_W) / std::max(line.length_m, 1e-6f);
     bool open = line.length_m > reach_m || line.from->normal_W.dot(along) > kOutside ||
                 line.to->normal_W.dot(along) < -kOutside;
@@ -197,8 +196,7 @@ ObjectTracker::Along ObjectTracker::went_along(Step& step, const Departure& depa
   }
   const auto most = std::max_element(on_arrival.begin(), on_arrival.end());
   if (most == on_arrival.end() || *most < kAlongSeenShare * all) return Along::kNo;
-  report_move(step, *arrivals[most - on_arrival.begin()], departure, move.T_new_old,
-              "moved_alike");
+  report_move(step, *arrivals[most - on_arrival.begin()], departure, move.T_new_old, "moved_alike");
   return Along::kMoved;
 }
 

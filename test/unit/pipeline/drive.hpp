@@ -106,6 +106,24 @@ class Drive {
   std::uint64_t count_ = 0;
 };
 
+/// Drawn as a class of its own; masks_of_instances() says that it is a box.
+inline constexpr ClassId kSecondBox = 50;
+
+/// The frame with masks of instances (classes.label_divisor is 100): boxes are 1, and those that
+/// are drawn as kSecondBox are 2, or without a number as all else when `told_apart` is false.
+inline Frame masks_of_instances(Frame frame, bool told_apart = true) {
+  frame.labels = frame.labels.clone();
+  for (int row = 0; row < frame.labels.rows; ++row) {
+    for (int col = 0; col < frame.labels.cols; ++col) {
+      auto& label = frame.labels.at<std::uint16_t>(row, col);
+      const int instance = label == kBoxClass ? 1 : label == kSecondBox ? 2 : 0;
+      const int thing = instance > 0 ? kBoxClass : label;
+      label = static_cast<std::uint16_t>(100 * thing + (told_apart ? instance : 0));
+    }
+  }
+  return frame;
+}
+
 /// For messages of failed expectations.
 inline std::string text(const std::vector<ObjectEvent>& events) {
   std::string out;

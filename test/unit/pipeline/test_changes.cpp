@@ -189,27 +189,15 @@ TEST(PipelineChanges, OneThingIsOneObjectHoweverItIsTurned) {
 TEST(PipelineChanges, WhatMasksShowAsTwoInstancesIsTwoThings) {
   PipelineConfig config = test::room_config();
   config.classes.label_divisor = 100;
-  constexpr ClassId kSecond = 50;  // as it is drawn; the masks say box
   for (const bool told_apart : {true, false}) {
     Drive drive(config);
     const auto watch = [&](const Scene& scene, int frames) {
-      for (int i = 0; i < frames; ++i) {
-        Frame frame = drive.next_frame(scene);
-        frame.labels = frame.labels.clone();
-        for (int row = 0; row < frame.labels.rows; ++row) {
-          for (int col = 0; col < frame.labels.cols; ++col) {
-            auto& label = frame.labels.at<std::uint16_t>(row, col);
-            const int instance = label == kBoxClass ? 1 : label == kSecond ? 2 : 0;
-            const int thing = instance > 0 ? kBoxClass : label;
-            label = static_cast<std::uint16_t>(100 * thing + (told_apart ? instance : 0));
-          }
-        }
-        drive.process(frame);
-      }
+      for (int i = 0; i < frames; ++i)
+        drive.process(test::masks_of_instances(drive.next_frame(scene), told_apart));
     };
     watch(room_with({right_cage()}), kLearn);
-    watch(room_with({solid(kBoxClass, {-0.3, 2.3}, kSize), solid(kSecond, {0.3, 2.3}, kSize),
-                     right_cage()}),
+    watch(room_with({solid(kBoxClass, {-0.3, 2.3}, kSize),
+                     solid(test::kSecondBox, {0.3, 2.3}, kSize), right_cage()}),
           2 * kPromptly);
     std::size_t boxes = 0;
     for (const ObjectSnapshot& object : drive.pipeline().objects())
