@@ -20,6 +20,9 @@ constexpr double kGapShare = 0.2;
 /// A line runs outside of a body when it leaves its surface by more than this, as a cosine with the
 /// normal.
 constexpr float kOutside = 0.4f;
+/// Two sides of a body face away from each other along the line between them, by this difference of
+/// cosines at least: surfaces that face one way are of two things in a row.
+constexpr float kApart = 0.2f;
 
 bool told_apart(const LibraryObject& a, const LibraryObject& b) {
   const auto apart = [](const LibraryObject& x, const LibraryObject& y) {
@@ -82,12 +85,15 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const Libra
   lines.resize((lines.size() + 1) / 2);
   if (lines.front().length_m > reach_m) return false;
   const auto cell_m = static_cast<float>(2.0 * config_.map.voxel_size_m);
+  const auto contact_m = static_cast<float>(
+      std::max(config_.segmentation.cluster_tolerance_m, 2.0 * config_.map.voxel_size_m));
   std::size_t crossing = 0;
   for (const Line& line : lines) {
     const Eigen::Vector3f along =
         (line.to->point_W - line.from->point_W) / std::max(line.length_m, 1e-6f);
-    bool open = line.length_m > reach_m || line.from->normal_W.dot(along) > kOutside ||
-                line.to->normal_W.dot(along) < -kOutside;
+    const float leaves = line.from->normal_W.dot(along), enters = -line.to->normal_W.dot(along);
+    bool open = line.length_m > reach_m || std::max(leaves, enters) > kOutside ||
+                (line.length_m > contact_m && leaves + enters > -kApart);
     for (float at = cell_m; !open && at < line.length_m - 0.5f * cell_m; at += 0.5f * cell_m)
       open = seen_empty(step.map, line.from->point_W + at * along);
     crossing += open;
@@ -116,7 +122,7 @@ void ObjectTracker::join_sides(Step& step) {
            library_.near(object->box.pose.position_W, object->box.size_m.norm())) {
         LibraryObject* other = library_.find(other_id);
         if (other_id == id || !other->confirmed || other->class_id != object->class_id ||
-            object->looks_unobserved > 0 || other->looks_unobserved > 0 ||
+            place_in_doubt(*object) || place_in_doubt(*other) ||
             !may_be_one(*object, *other) || !sides_of_one(step, *object, *other)) {
           continue;
         }

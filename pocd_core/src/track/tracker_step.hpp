@@ -29,6 +29,12 @@ struct ObjectTracker::Step {
 /// Share of a found object that lies within another one's box when it is another side of it.
 inline constexpr double kInsideShare = 0.6;
 
+/// Whether the last look at an object did not find it in its place: what stands there may be another
+/// thing.
+inline bool place_in_doubt(const LibraryObject& object) {
+  return object.looks_unobserved > 0 || object.looks_displaced > 0;
+}
+
 /// The surfels after a motion [m, W]; none of them has been seen through there.
 std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose& T_new_old);
 
