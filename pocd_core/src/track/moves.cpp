@@ -23,7 +23,9 @@ constexpr double kEmptyShare = 0.25;
 constexpr double kSeenShare = 0.2;
 /// A thing in a place that was not seen empty before moved no farther than this, in its lengths,
 /// unless it is whole and fits surely. When less than kWholeShare of it is seen, it fits surely and
-/// has turned by less than kShiftRad: else it may be what the old one hid.
+/// has turned by less than kShiftRad: else it may be what the old one hid. It fits surely when at
+/// least kSureFit of the new surface has a place on the old body, and nothing speaks against the
+/// rest.
 constexpr double kNearShare = 1.0;
 constexpr double kSureFit = 0.9;
 constexpr double kShiftRad = M_PI / 4.0;
@@ -114,7 +116,7 @@ bool ObjectTracker::may_tell(const Motion& motion, const Departure& departure,
          (now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns);
 }
 
-std::optional<Motion> ObjectTracker::explanation(const Departure& departure,
+std::optional<Motion> ObjectTracker::explanation(const Step& step, const Departure& departure,
                                                  const LibraryObject& found,
                                                  const IcpTarget& target, const Points& source,
                                                  const IcpResult& icp) const {
@@ -131,14 +133,20 @@ std::optional<Motion> ObjectTracker::explanation(const Departure& departure,
   if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
     return std::nullopt;
   motion.lengths = moved_m / longest_side(departure.box);
-  // What of the old surface is at the new place, and what is not.
+  // What of the old surface is at the new place, and what is not. What the new thing hides may have
+  // been seen empty before it came.
+  const double hidden_m = config_.map.voxel_size_m;
+  const auto hidden = [&](const Eigen::Vector3f& point_W) {
+    const auto view = view_of(step.cloud, point_W.cast<double>());
+    return view && view->measured_m > 0.0 && view->measured_m < view->depth_m - hidden_m;
+  };
   const Eigen::Isometry3f T = motion.T_new_old.cast<float>();
   std::size_t empty = 0, seen = 0;
   for (const Surfel& s : departure.surfels) {
     const Eigen::Vector3f there = T * s.point_W;
     if (found.model.nearest(there, static_cast<float>(inlier_m)) != ObjectModel::kNone) {
       ++seen;
-    } else if (free_space_.seen_empty(there)) {
+    } else if (free_space_.seen_empty(there) && !hidden(there)) {
       ++empty;
     }
   }
@@ -147,25 +155,30 @@ std::optional<Motion> ObjectTracker::explanation(const Departure& departure,
       static_cast<double>(empty) / std::max(1.0, static_cast<double>(seen + empty));
   if (contradicted > kEmptyShare) return std::nullopt;
   motion.fit = 1.0 - icp.dissimilarity - contradicted;
-  // What of the new surface the old place has no room for.
-  std::size_t beside = 0;
+  // What of the new surface the old box has no room for, and what lies within the old body: all
+  // else is on its surface, or on a side of it that was not known.
+  std::size_t beside = 0, within = 0;
   for (const auto& p : source) {
-    const Eigen::Vector3d there = icp.T_target_source * p.cast<double>();
-    beside += !is_inside(departure.box, inlier_m, there.cast<float>()) &&
-              !target.nearest((there - target.origin_W()).cast<float>());
+    const Eigen::Vector3f there = (icp.T_target_source * p.cast<double>()).cast<float>();
+    if (target.nearest(there - target.origin_W().cast<float>())) continue;
+    beside += !is_inside(departure.box, inlier_m, there);
+    within += is_inside(departure.box, -2.0 * inlier_m, there);
   }
+  const double placed =
+      1.0 - static_cast<double>(beside + within) / static_cast<double>(source.size());
+  motion.fits_surely = placed - contradicted >= kSureFit;
   if (static_cast<double>(beside) > kBesideShare * static_cast<double>(source.size()) &&
       motion.seen < kWholeShare) {
     return std::nullopt;
   }
   const bool surely_whole =
-      found.arrival == Arrival::kUnknown && motion.seen >= kWholeShare && motion.fit >= kSureFit;
+      found.arrival == Arrival::kUnknown && motion.seen >= kWholeShare && motion.fits_surely;
   if (motion.lengths > kNearShare && found.arrival != Arrival::kArrived && !surely_whole)
     return std::nullopt;
   return motion;
 }
 
-std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
+std::optional<Motion> ObjectTracker::motion_of(const Step& step, const Departure& departure,
                                                const LibraryObject& found) const {
   if (departure.class_id != found.class_id || departure.id == found.id) return std::nullopt;
   // What was seen in its place when the new one was there, too, is another thing.
@@ -181,8 +194,8 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
 
   Points source;
   const auto& surfels = found.model.surfels();
-  const std::size_t step = std::max<std::size_t>(1, surfels.size() / kAlignPoints);
-  for (std::size_t i = 0; i < surfels.size(); i += step) source.push_back(surfels[i].point_W);
+  const std::size_t stride = std::max<std::size_t>(1, surfels.size() / kAlignPoints);
+  for (std::size_t i = 0; i < surfels.size(); i += stride) source.push_back(surfels[i].point_W);
   const double inlier_m = kOnVoxels * config_.map.voxel_size_m;
   const IcpTarget target = icp_target(departure.surfels, inlier_m,
                                       std::max(inlier_m, config_.association.icp_max_distance_m));
@@ -194,7 +207,7 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   for (const Pose& start : starts) {
     const IcpResult icp = point_to_plane_icp(target, source, options, start);
     if (icp.dissimilarity > kUnseenShare) continue;
-    if (const auto motion = explanation(departure, found, target, source, icp))
+    if (const auto motion = explanation(step, departure, found, target, source, icp))
       explanations.push_back(*motion);
   }
   const auto best = std::max_element(
@@ -204,7 +217,7 @@ std::optional<Motion> ObjectTracker::motion_of(const Departure& departure,
   if (best == explanations.end() || best->seen < kSeenShare) return std::nullopt;
   if (best->seen >= kWholeShare) return *best;
   if (found.arrival != Arrival::kArrived &&
-      (best->fit < kSureFit || Eigen::AngleAxisd(best->T_new_old.linear()).angle() > kShiftRad)) {
+      (!best->fits_surely || Eigen::AngleAxisd(best->T_new_old.linear()).angle() > kShiftRad)) {
     return std::nullopt;
   }
   // Of a small part of a flat face nobody can tell how far it slid.
@@ -243,7 +256,7 @@ LibraryObject* ObjectTracker::find_departed(const Step& step, const Departure& d
     const bool open = other->confirmed ? other->added_ns && now_ns - *other->added_ns <= window_ns
                                        : other->observations >= 2;
     if (!open || other->id == departure.part_of) continue;
-    const auto m = motion_of(departure, *other);
+    const auto m = motion_of(step, departure, *other);
     if (!m || (best && m->likelihood() <= motion.likelihood())) continue;
     best = other, motion = *m;
   }
@@ -288,7 +301,7 @@ bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
   Motion motion;
   for (const Departure& d :
        departures_.recent(step.frame.stamp_ns, config_.state.relocation_window_s)) {
-    const auto m = motion_of(d, object);
+    const auto m = motion_of(step, d, object);
     if (!m || (best && m->likelihood() <= motion.likelihood())) continue;
     best = &d, motion = *m;
   }

@@ -198,17 +198,10 @@ void ObjectTracker::begin_anew(Step& step, LibraryObject& object) {
 
 void ObjectTracker::clear_gone(Step& step, ObjectId id,
                                const std::function<bool(const Eigen::Vector3d&)>& inside) {
-  const OrganizedCloud& cloud = step.cloud;
-  const Pose T_C_W = cloud.T_W_C.inverse();
   const double near_m = 2.0 * config_.map.voxel_size_m;
   const auto measured_now = [&](const Eigen::Vector3d& center_W) {
-    const Eigen::Vector3d p = T_C_W * center_W;
-    if (p.z() < near_m) return false;
-    const int col = static_cast<int>(cloud.camera.fx * p.x() / p.z() + cloud.camera.cx + 0.5);
-    const int row = static_cast<int>(cloud.camera.fy * p.y() / p.z() + cloud.camera.cy + 0.5);
-    if (col < 0 || row < 0 || col >= cloud.width || row >= cloud.height) return false;
-    return std::abs(cloud.depth_m[static_cast<std::size_t>(row) * cloud.width + col] - p.z()) <
-           near_m;
+    const auto view = view_of(step.cloud, center_W);
+    return view && view->depth_m >= near_m && std::abs(view->measured_m - view->depth_m) < near_m;
   };
   std::vector<const LibraryObject*> others;
   if (const LibraryObject* object = library_.find(id)) {

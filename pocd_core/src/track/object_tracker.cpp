@@ -27,6 +27,15 @@ constexpr double kClearVoxels = 1.5;
 
 }  // namespace
 
+std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Eigen::Vector3d& point_W) {
+  const Eigen::Vector3d p = cloud.T_W_C.inverse() * point_W;
+  if (p.z() <= 0.0) return std::nullopt;
+  const int col = static_cast<int>(cloud.camera.fx * p.x() / p.z() + cloud.camera.cx + 0.5);
+  const int row = static_cast<int>(cloud.camera.fy * p.y() / p.z() + cloud.camera.cy + 0.5);
+  if (col < 0 || row < 0 || col >= cloud.width || row >= cloud.height) return std::nullopt;
+  return PixelView{p.z(), cloud.depth_m[static_cast<std::size_t>(row) * cloud.width + col]};
+}
+
 ObjectTracker::ObjectTracker(const PipelineConfig& config)
     : config_(config),
       free_space_(std::max(2.0 * config.map.voxel_size_m, config.map.max_depth_m / kViewCells)) {}

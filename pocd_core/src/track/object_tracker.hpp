@@ -120,12 +120,13 @@ class ObjectTracker {
   /// Whether a like object near by is being found gone: then the new one may be that one.
   bool origin_in_doubt(const LibraryObject& object);
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
-  std::optional<Motion> motion_of(const Departure& departure, const LibraryObject& found) const;
+  std::optional<Motion> motion_of(const Step& step, const Departure& departure,
+                                  const LibraryObject& found) const;
   /// The same by one alignment of the found surface `source` with what departed, `target`; nothing
   /// when what was seen speaks against it.
-  std::optional<Motion> explanation(const Departure& departure, const LibraryObject& found,
-                                    const IcpTarget& target, const Points& source,
-                                    const IcpResult& icp) const;
+  std::optional<Motion> explanation(const Step& step, const Departure& departure,
+                                    const LibraryObject& found, const IcpTarget& target,
+                                    const Points& source, const IcpResult& icp) const;
   bool may_tell(const Motion& motion, const Departure& departure, const LibraryObject& found,
                 StampNs now_ns) const;
   /// The known or new object that is what departed, by the shortest motion; or null.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "object_tracker.hpp"
@@ -29,11 +30,20 @@ struct ObjectTracker::Step {
 /// Share of a found object that lies within another one's box when it is another side of it.
 inline constexpr double kInsideShare = 0.6;
 
-/// Whether the last look at an object did not find it in its place: what stands there may be another
-/// thing.
+/// Whether the last look at an object did not find it in its place: what stands there may be
+/// another thing.
 inline bool place_in_doubt(const LibraryObject& object) {
   return object.looks_unobserved > 0 || object.looks_displaced > 0;
 }
+
+/// A point in a camera's image: its depth, and the one that was measured at its pixel (0: none)
+/// [m].
+struct PixelView {
+  double depth_m = 0.0;
+  double measured_m = 0.0;
+};
+/// Nothing when the point [m, W] is not in front of the camera or outside of the image.
+std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Eigen::Vector3d& point_W);
 
 /// The surfels after a motion [m, W]; none of them has been seen through there.
 std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose& T_new_old);

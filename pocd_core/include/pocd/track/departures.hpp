@@ -28,9 +28,10 @@ struct Departure {
 /// How a thing went from its old place to the new one.
 struct Motion {
   Pose T_new_old = Pose::Identity();
-  double fit = 0.0;      ///< of what is known at the new place, the share that agrees
-  double seen = 0.0;     ///< share of the old surface that is seen at the new place
-  double lengths = 0.0;  ///< of its way (mean over its points), in its own lengths
+  double fit = 0.0;          ///< of what is known at the new place, the share that agrees
+  bool fits_surely = false;  ///< nearly all of the new surface has a place on the old body
+  double seen = 0.0;         ///< share of the old surface that is seen at the new place
+  double lengths = 0.0;      ///< of its way (mean over its points), in its own lengths
   /// Share of the surface that a motion must explain more when it is longer by the thing's length.
   static constexpr double kShortness = 0.4;
   /// Orders motions. Of those that explain the same, the shortest comes first: the sides of a box
