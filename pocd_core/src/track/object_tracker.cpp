@@ -113,7 +113,8 @@ void ObjectTracker::update_beliefs(Step& step) {
     Look& look = looks_[n];
     LibraryObject& object = *look.object;
     const bool first = moment_of(step, object).robots.size() == 1;
-    if (look.verdict != Verdict::kDisplaced) object.looks_displaced = 0;
+    // A look that is contested does not say that it stands where it was.
+    if (look.verdict != Verdict::kDisplaced && !look.contested) object.looks_displaced = 0;
     switch (look.verdict) {
       case Verdict::kTooLittleSeen:
       case Verdict::kHidden:
