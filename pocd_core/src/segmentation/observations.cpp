@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "clusters.hpp"
 #include "pocd/common/cell_index.hpp"
@@ -75,6 +76,14 @@ void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& pla
       }
     }
   }
+}
+
+/// Whether two clusters may be pieces of one thing, by class and instance.
+bool any_alike(const std::vector<Cluster>& clusters) {
+  std::set<ClassId> seen;
+  return std::any_of(clusters.begin(), clusters.end(), [&](const Cluster& c) {
+    return c.instance == 0 && !seen.insert(c.class_id).second;
+  });
 }
 
 /// Makes one cluster of the pieces of a thing. What is one has an instance of its own from then on.
@@ -303,8 +312,7 @@ void extract_observations(const SegmentationConfig& config, const DepthNoise& no
   static thread_local Memory memory;
   std::vector<Cluster> clusters = find_clusters(cloud, config, noise, memory.clusters);
   merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters, memory);
-  if (std::any_of(clusters.begin(), clusters.end(),
-                  [](const Cluster& c) { return c.class_id == kThing; })) {
+  if (any_alike(clusters)) {
     join_pieces(cloud, config, noise, spacing_m, planes, clusters, memory);
     merge_overlapping(cloud, planes, 2.0 * spacing_m, clusters, memory);
   }

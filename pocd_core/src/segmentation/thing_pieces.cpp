@@ -36,7 +36,7 @@ class Pieces {
         clusters_(clusters),
         cluster_of_(cloud.size(), kNone) {
     for (std::size_t k = 0; k < clusters.size(); ++k) {
-      if (clusters[k].class_id != kThing) continue;
+      if (clusters[k].instance != 0) continue;
       for (const std::int32_t i : clusters[k].members)
         cluster_of_[i] = static_cast<std::int32_t>(k);
     }
@@ -124,7 +124,7 @@ class Pieces {
       if (!(along < 0.0f)) return;
       if (std::abs(plane->normal_W.dot(p_W) - plane->offset_m) < reach_at(z)) {
         const std::int32_t other = cluster_of_[j];
-        if (hidden && other != kNone && other != cluster_of_[i]) {
+        if (hidden && other != kNone && other != cluster_of_[i] && alike(i, j)) {
           ++(goes_on(line, k, n, *plane) ? bridges_ : breaks_)[pair_of(i, j)];
         }
         return;
@@ -160,12 +160,17 @@ class Pieces {
                           cloud_.point_W(static_cast<std::size_t>(j)))
                              .head<2>()
                              .norm();
-      if (cluster_of_[j] != cluster_of_[i] && z > cloud_.depth_m[i] + step_at(z) &&
+      if (cluster_of_[j] != cluster_of_[i] && alike(i, j) && z > cloud_.depth_m[i] + step_at(z) &&
           away < depth_of(i) && !has_top(column, k)) {
         ++edges_[pair_of(i, j)];
       }
       return;
     }
+  }
+
+  bool alike(std::int32_t i, std::int32_t j) const {
+    return clusters_[static_cast<std::size_t>(cluster_of_[i])].class_id ==
+           clusters_[static_cast<std::size_t>(cluster_of_[j])].class_id;
   }
 
   Pair pair_of(std::int32_t i, std::int32_t j) const {

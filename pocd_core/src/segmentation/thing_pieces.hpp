@@ -1,4 +1,4 @@
-// Things that are seen in pieces, told by geometry: where no masks say what is one thing.
+// Things that are seen in pieces, told by geometry: where no instances say what is one thing.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 namespace pocd {
 
 /// For each cluster the first one (itself, or one before it) that is a piece of the same thing.
-/// Only clusters of class kThing are looked at. Two pieces are of one thing when
+/// Only clusters without an instance are looked at. Two pieces of one class are of one thing when
 /// - something nearer hides what lies between them, and the surface of each goes on in the other's
 ///   plane, along at least half of the smaller one (a box behind a post); or
 /// - one is seen over the upper edge of the other, which has no top though the camera looks down on
