@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 
 namespace pocd {
 namespace {
@@ -71,9 +72,17 @@ class Pieces {
             count > 2 * breaks_[pair])
           join(pair);
       }
+      // The far wall of a container is not the near wall of the next one.
+      std::set<std::size_t> far_walls;
+      for (auto it = edges_.begin(); it != edges_.end();) {
+        const auto& [near, far] = it->first;
+        const int larger = std::max(extents_[near], extents_[far]);
+        const bool rim = it->second >= config_.things.rim_share * larger && same_height(it->first);
+        if (rim) far_walls.insert(far);
+        it = rim ? std::next(it) : edges_.erase(it);
+      }
       for (const auto& [pair, count] : edges_) {
-        const int larger = std::max(extents_[pair.first], extents_[pair.second]);
-        if (count >= config_.things.rim_share * larger && same_height(pair)) join(pair);
+        if (far_walls.count(pair.first) == 0) join(pair);
       }
     }
     for (std::size_t k = 0; k < parent.size(); ++k) parent[k] = root(k);
@@ -162,7 +171,8 @@ class Pieces {
                              .norm();
       if (cluster_of_[j] != cluster_of_[i] && alike(i, j) && z > cloud_.depth_m[i] + step_at(z) &&
           away < depth_of(i) && !has_top(column, k)) {
-        ++edges_[pair_of(i, j)];
+        ++edges_[{static_cast<std::size_t>(cluster_of_[i]),
+                  static_cast<std::size_t>(cluster_of_[j])}];
       }
       return;
     }
@@ -225,7 +235,8 @@ class Pieces {
   std::vector<std::int32_t> cluster_of_;  // per grid pixel
   std::vector<int> extents_;              // per cluster: lines on which it has pixels
   std::vector<std::int32_t> counted_;
-  std::map<Pair, int> bridges_, breaks_, edges_;
+  std::map<Pair, int> bridges_, breaks_;
+  std::map<Pair, int> edges_;  // the nearer piece first
 };
 
 }  // namespace

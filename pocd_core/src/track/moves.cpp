@@ -236,8 +236,9 @@ bool ObjectTracker::origin_in_doubt(const LibraryObject& object) {
   for (const ObjectId id :
        library_.near(object.box.pose.position_W, config_.state.relocation_reach_m)) {
     const LibraryObject* other = library_.find(id);
-    if (other->confirmed && other->class_id == object.class_id && place_in_doubt(*other) &&
-        other->in_place_ns <= object.first_seen_ns) {
+    if (other->confirmed && other->class_id == object.class_id &&
+        (other->looks_displaced > 0 ||
+         (other->looks_unobserved > 0 && other->in_place_ns <= object.first_seen_ns))) {
       return true;
     }
   }

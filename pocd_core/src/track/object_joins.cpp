@@ -162,7 +162,7 @@ LibraryObject* ObjectTracker::whole_of(Step& step, const LibraryObject& found) {
   for (const ObjectId id : library_.near(found.box.pose.position_W, found.box.size_m.norm())) {
     LibraryObject* other = library_.find(id);
     if (id == found.id || !other->confirmed || other->class_id != found.class_id ||
-        place_in_doubt(*other) || seen_apart(step, found.id, id)) {
+        other->looks_unobserved > 0 || seen_apart(step, found.id, id)) {
       continue;
     }
     if (coincide(found, *other)) return other;

@@ -315,11 +315,11 @@ void ObjectTracker::confirm_objects(Step& step) {
     LibraryObject* object = library_.find(id);
     if (!object || object->confirmed) continue;
     if (object->model.surfels().size() < least_surfels()) continue;
+    if (object->observations < needed + wait && origin_in_doubt(*object)) continue;
     if (LibraryObject* whole = whole_of(step, *object)) {
       absorb(step, *whole, *object);
       continue;
     }
-    if (object->observations < needed + wait && origin_in_doubt(*object)) continue;
     // Of what geometry alone tells, a side must have been seen: it may be a piece of a wall.
     if (object->class_id == kThing && object->most_free < config_.segmentation.things.side_share) {
       continue;

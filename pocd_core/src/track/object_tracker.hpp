@@ -117,7 +117,7 @@ class ObjectTracker {
   void confirm(Step& step, LibraryObject& object);
   /// Reports the object as moved when it is one that departed; false when there is none.
   bool find_origin(Step& step, LibraryObject& object);
-  /// Whether a like object near by is being found gone: then the new one may be that one.
+  /// Whether a like object near by is being found gone or displaced: then the new one may be it.
   bool origin_in_doubt(const LibraryObject& object);
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
   std::optional<Motion> motion_of(const Step& step, const Departure& departure,

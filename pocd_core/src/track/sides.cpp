@@ -122,8 +122,8 @@ void ObjectTracker::join_sides(Step& step) {
            library_.near(object->box.pose.position_W, object->box.size_m.norm())) {
         LibraryObject* other = library_.find(other_id);
         if (other_id == id || !other->confirmed || other->class_id != object->class_id ||
-            place_in_doubt(*object) || place_in_doubt(*other) || !may_be_one(*object, *other) ||
-            !sides_of_one(step, *object, *other)) {
+            object->looks_unobserved > 0 || other->looks_unobserved > 0 ||
+            !may_be_one(*object, *other) || !sides_of_one(step, *object, *other)) {
           continue;
         }
         const bool older = object->id < other->id;

@@ -30,12 +30,6 @@ struct ObjectTracker::Step {
 /// Share of a found object that lies within another one's box when it is another side of it.
 inline constexpr double kInsideShare = 0.6;
 
-/// Whether the last look at an object did not find it in its place: what stands there may be
-/// another thing.
-inline bool place_in_doubt(const LibraryObject& object) {
-  return object.looks_unobserved > 0 || object.looks_displaced > 0;
-}
-
 /// A point in a camera's image: its depth, and the one that was measured at its pixel (0: none)
 /// [m].
 struct PixelView {
