@@ -22,7 +22,7 @@ done < <(find "$source_folder/pocd_core" "$prefix/include/pocd" -type f \
   \( -name '*.hpp' -o -name '*.cpp' -o -name '*.h' \) -print0)
 ((checked > 20)) || complain "only $checked files found: wrong folders?"
 
-for library in "$prefix"/lib/libpocd_core.* "$prefix"/lib/libpocd_config.* "$prefix"/lib/libpocd_network.*; do
+for library in "$prefix"/lib/libpocd_{core,memory,io,config,sim,datasets,eval,network}.a; do
   [[ -f $library ]] || { complain "$library is not installed" && continue; }
   if nm --demangle "$library" 2>/dev/null | grep -E 'eprosima|fastdds|fastcdr' >&2; then
     complain "$library uses middleware symbols"

@@ -9,7 +9,7 @@
 #include "../pipeline/archive_basics.hpp"
 #include "pocd/common/archive.hpp"
 #include "pocd/map/map_delta.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
 namespace pocd {

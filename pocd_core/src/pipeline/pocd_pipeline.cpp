@@ -58,7 +58,8 @@ struct PocdPipeline::Impl {
         classes(c.classes),
         pool(c.threads),
         pose_gate(c.pose_gate),
-        tracker(c),
+        tracker(TrackerConfig{c.depth_noise, c.classes, c.segmentation, c.association, c.change,
+                              c.state, c.map}),
         map(c.map),
         looked_at(c.map.voxel_size_m) {}
 

@@ -5,9 +5,9 @@
 #include <limits>
 #include <utility>
 
-#include "pocd/change/geometric_change.hpp"
 #include "pocd/common/cell_index.hpp"
-#include "pocd/state/lifecycle.hpp"
+#include "pocd/observe/geometric_change.hpp"
+#include "pocd/track/apply_measurement.hpp"
 
 namespace pocd {
 namespace {
@@ -27,7 +27,7 @@ constexpr double kClearVoxels = 1.5;
 
 }  // namespace
 
-ObjectTracker::ObjectTracker(const PipelineConfig& config)
+ObjectTracker::ObjectTracker(const TrackerConfig& config)
     : config_(config),
       free_space_(std::max(2.0 * config.map.voxel_size_m, config.map.max_depth_m / kViewCells)) {}
 

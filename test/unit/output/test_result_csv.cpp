@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "pocd/common/check.hpp"
-#include "pocd/output/change_report.hpp"
+#include "pocd/eval/change_report.hpp"
 #include "pocd/output/result_csv.hpp"
 #include "run_command.hpp"
 

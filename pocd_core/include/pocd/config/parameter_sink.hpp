@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 
 namespace pocd {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pocd/map/mesh.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 

@@ -6,7 +6,7 @@
 
 #include "pocd/input/frame.hpp"
 #include "pocd/map/tsdf_map.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd/pipeline/operator_word.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/pipeline/pipeline_pieces.hpp"

@@ -1,0 +1,21 @@
+#include "pocd/objects/frame_result.hpp"
+
+namespace pocd {
+
+const char* to_string(EventKind kind) {
+  switch (kind) {
+    case EventKind::kAdded:
+      return "ADDED";
+    case EventKind::kUpdated:
+      return "UPDATED";
+    case EventKind::kMoved:
+      return "MOVED";
+    case EventKind::kRemoved:
+      return "REMOVED";
+    case EventKind::kOperator:
+      return "OPERATOR";
+  }
+  return "";
+}
+
+}  // namespace pocd
