@@ -35,11 +35,13 @@ for program in pocd_map pocd_parameters; do
     complain "$program is linked with middleware"
   fi
 done
-# Only what runs a network loads OpenCV's dnn module.
+# What is on the bus at a site reads no image files, data sets or scenes, and runs no network.
+offline='opencv_dnn|opencv_imgcodecs|libgdal|libpoppler|libhdf5|libpcl|libvtk|libembree'
 for program in pocd_node pocd_mirror pocd_health pocd_view pocd_record; do
   [[ -x $prefix/bin/$program ]] || continue
-  if ldd "$prefix/bin/$program" | grep 'opencv_dnn' >&2; then
-    complain "$program is linked with OpenCV's dnn module"
+  if ldd "$prefix/bin/$program" | grep -E "$offline" >&2; then
+    complain "$program loads what only offline programs need"
   fi
+  echo "$program: $(ldd "$prefix/bin/$program" | grep -c '=>') shared libraries"
 done
 exit $failed
