@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 
-#include "parameter_text.hpp"
+#include "../common/parameter_text.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {

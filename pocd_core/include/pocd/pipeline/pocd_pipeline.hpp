@@ -23,6 +23,8 @@ struct RegionLook {
 /// and gives the same bits for every number of them.
 class PocdPipeline {
  public:
+  /// Throws InputError that names every field with a value that is not allowed, as a file of
+  /// parameters would.
   explicit PocdPipeline(const PipelineConfig& config);
   ~PocdPipeline();
 
