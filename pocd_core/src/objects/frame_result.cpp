@@ -18,4 +18,16 @@ const char* to_string(EventKind kind) {
   return "";
 }
 
+const char* to_string(Arrival arrival) {
+  switch (arrival) {
+    case Arrival::kFound:
+      return "found";
+    case Arrival::kArrived:
+      return "arrived";
+    case Arrival::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
 }  // namespace pocd

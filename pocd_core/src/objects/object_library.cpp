@@ -112,18 +112,6 @@ std::vector<ObjectId> ObjectLibrary::near(const Eigen::Vector3d& center_W, doubl
   return ids;
 }
 
-const char* to_string(Arrival arrival) {
-  switch (arrival) {
-    case Arrival::kFound:
-      return "found";
-    case Arrival::kArrived:
-      return "arrived";
-    case Arrival::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
 ObjectSnapshot snapshot(const LibraryObject& object) {
   ObjectSnapshot s;
   s.id = object.id;

@@ -360,6 +360,7 @@ ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryO
   event.frame_sequence = step.frame.sequence;
   event.robot = step.frame.robot;
   event.box = object.box;
+  if (kind == EventKind::kAdded) event.arrival = object.arrival;
   event.evidence = evidence_of(step, object);
   event.evidence.rule = rule;
   step.result.events.push_back(std::move(event));

@@ -46,6 +46,26 @@ TEST(ResultCsv, EventsReadBack) {
   EXPECT_EQ(events[1].class_name, "box of \"steel\"") << "a row is a line";
 }
 
+// Last, so that readers by position go on.
+TEST(ResultCsv, AddedHasItsArrivalInTheLastColumn) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "events.csv";
+  EventsCsv csv(file);
+  ObjectEvent event = moved_event();
+  csv.add(event, "box");
+  event.kind = EventKind::kAdded;
+  for (const Arrival arrival : {Arrival::kUnknown, Arrival::kFound, Arrival::kArrived}) {
+    event.arrival = arrival;
+    csv.add(event, "box");
+  }
+  csv.close();
+  std::istringstream text(read_text(file));
+  std::vector<std::string> last;
+  for (std::string line; std::getline(text, line);)
+    last.push_back(line.substr(line.rfind(',') + 1));
+  EXPECT_EQ(last, (std::vector<std::string>{"arrival", "", "unknown", "found", "arrived"}));
+}
+
 TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "objects.csv";

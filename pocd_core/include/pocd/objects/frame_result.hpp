@@ -38,6 +38,14 @@ struct ObjectSnapshot {
 enum class EventKind { kAdded, kUpdated, kMoved, kRemoved, kOperator };
 const char* to_string(EventKind kind);  ///< "ADDED", "UPDATED", "MOVED", "REMOVED"
 
+/// Whether a thing came to its place while the system knew of the place.
+enum class Arrival : std::uint8_t {
+  kUnknown,  ///< part of its place was seen empty before, part of it was never seen
+  kFound,    ///< its place was never seen empty: it may always have stood there
+  kArrived,  ///< its place was seen empty before
+};
+const char* to_string(Arrival arrival);  ///< "unknown", "found", "arrived"
+
 /// Why an event happened: enough to recompute the belief step that made it.
 struct Evidence {
   double delta_m = 0.0;             ///< measured geometric change
@@ -64,6 +72,8 @@ struct ObjectEvent {
   std::optional<OrientedBox> previous_box;  ///< MOVED: where it was
   /// An object that was reported as ADDED before and turned out to be this one; its id is retired.
   std::optional<ObjectId> absorbed;
+  /// ADDED: whether it came while the system knew of the place. Unknown for other kinds.
+  Arrival arrival = Arrival::kUnknown;
   Evidence evidence;
   /// REMOVED, MOVED: it went between the last look that found it in its place and the first one of
   /// those that found the place empty. 0: not known.

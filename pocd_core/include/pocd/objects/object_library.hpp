@@ -27,14 +27,6 @@ struct Moment {
   int points = 0;                   ///< of the object, that the view in the belief told of
 };
 
-/// Whether a thing came to its place while the system knew of the place.
-enum class Arrival : std::uint8_t {
-  kUnknown,  ///< part of its place was seen empty before, part of it was never seen
-  kFound,    ///< its place was never seen empty: it may always have stood there
-  kArrived,  ///< its place was seen empty before
-};
-const char* to_string(Arrival arrival);  ///< "unknown", "found", "arrived"
-
 /// What the system knows of one thing: the paper's fields, and where it is in its life.
 struct LibraryObject {
   LibraryObject(ObjectId object_id, double spacing_m) : id(object_id), model(spacing_m) {}
