@@ -1,5 +1,6 @@
 #include "pocd/input/pose_gate.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -49,8 +50,21 @@ void PoseGate::accept(Track& track, const Pose& pose, StampNs stamp_ns) const {
   track.refused_in_a_row = 0;
 }
 
+void PoseGate::forget_one_but(const std::string& robot) {
+  auto oldest = tracks_.end();
+  StampNs oldest_ns = 0;
+  for (auto it = tracks_.begin(); it != tracks_.end(); ++it) {
+    const StampNs heard_ns = std::max(it->second.accepted_ns, it->second.refused_ns);
+    if (it->first == robot || (oldest != tracks_.end() && heard_ns >= oldest_ns)) continue;
+    oldest = it;
+    oldest_ns = heard_ns;
+  }
+  tracks_.erase(oldest);
+}
+
 std::optional<std::string> PoseGate::refuse(const Frame& frame) {
   const auto [it, fresh] = tracks_.try_emplace(frame.robot);
+  if (tracks_.size() > kMostRobots) forget_one_but(frame.robot);
   Track& track = it->second;
   double jump_m = 0.0, turn_deg = 0.0;
   bool ok = fresh || (plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,

@@ -51,7 +51,7 @@ TEST(RayTracedChange, UnmovedWallHasAlmostNone) {
 // difference of the ranges, d to d * 1.15 at the corner of the image (1.05 on average).
 TEST(RayTracedChange, ShiftAlongTheRayIsMeasured) {
   Random random(43);
-  const RayTracedChangeOptions options;
+  const RayTracedChangeOptions options{0.05, 0.2, 1.6};
   for (double d : {0.05, 0.1, 0.2, 0.3}) {
     const Points here = wall(1.6, 0.0, 0.0, random);
     const Points nearer = wall(1.6 - d, 0.0, 0.0, random);

@@ -117,5 +117,13 @@ TEST_F(PoseGateTest, NamelessRobotHasNoPrefix) {
   EXPECT_EQ(show(1, 2.0, 0.0, "")->find("pose jump"), 0u);
 }
 
+TEST_F(PoseGateTest, RobotsThatWereHeardOfLastAreKept) {
+  const int names = static_cast<int>(PoseGate::kMostRobots) + 20;
+  for (int i = 0; i < names; ++i) show(i, 0.0, 0.0, "name" + std::to_string(i));
+  EXPECT_EQ(gate_.robots(), PoseGate::kMostRobots);
+  EXPECT_FALSE(show(names, 50.0, 0.0, "name0")) << "forgotten, and so as new";
+  EXPECT_TRUE(show(names + 1, 500.0, 0.0, "name" + std::to_string(names - 1)));
+}
+
 }  // namespace
 }  // namespace pocd

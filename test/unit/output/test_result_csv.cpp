@@ -80,8 +80,8 @@ TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
   const std::string row = text.substr(text.find('\n') + 1);
   EXPECT_EQ(
       row,
-      "5,7,box,0,0.000000,0.000000,0.000000,0.000000,1.000000,0.500000,2.000000,0.000000,0.67,0.67,"
-      "0.33,0,0.5,0,0,0,robot1\n");
+      "5,7,box,0,0.000000,0.000000,0.000000,0.000000,1.000000,0.500000,2.000000,0.000000,0.67,2.01,"
+      "0.99,0,0.5,0,0,0,robot1\n");
   EXPECT_EQ(std::count(text.begin(), text.begin() + static_cast<long>(text.find('\n')), ','),
             std::count(row.begin(), row.end(), ','));
 }

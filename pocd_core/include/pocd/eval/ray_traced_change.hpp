@@ -14,7 +14,7 @@ struct RayTracedChangeOptions {
   double voxel_size_m = 0.05;  ///< > 0
   /// Half the thickness of the band around each surface, >= voxel_size_m. Surfaces farther apart
   /// than twice this along the ray share no voxel.
-  double truncation_m = 0.2;
+  double truncation_m = 0.8;
   double lambda_diff = 1.6;  ///< scale of the published measure, >= 0
 };
 

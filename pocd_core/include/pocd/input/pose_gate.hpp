@@ -34,7 +34,8 @@ struct PoseGateConfig {
   }
 };
 
-/// One gate for all robots; keeps the last accepted pose of each. Not thread-safe.
+/// One gate for all robots; keeps the last accepted pose of each of the kMostRobots that were heard
+/// of last: names may be many, and one that comes back is as new. Not thread-safe.
 class PoseGate {
  public:
   explicit PoseGate(const PoseGateConfig& config) : config_(config) {}
@@ -42,6 +43,9 @@ class PoseGate {
   /// Nothing when the pose may be used, else a line that says why not, e.g.
   /// "robot1: pose jump of 0.31 m and 2.0 deg in 0.07 s".
   std::optional<std::string> refuse(const Frame& frame);
+
+  static constexpr std::size_t kMostRobots = 1000;
+  std::size_t robots() const { return tracks_.size(); }
 
  private:
   friend struct ArchiveAccess;
@@ -60,6 +64,7 @@ class PoseGate {
 
   /// Whether the pose lies on the way that the accepted poses led.
   bool on_its_way(const Track& track, const Pose& pose, StampNs stamp_ns) const;
+  void forget_one_but(const std::string& robot);
   void accept(Track& track, const Pose& pose, StampNs stamp_ns) const;
 
   PoseGateConfig config_;

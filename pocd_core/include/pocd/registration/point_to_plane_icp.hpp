@@ -16,7 +16,7 @@ enum class IcpFreedom {
 
 struct IcpOptions {
   IcpFreedom freedom = IcpFreedom::kYaw;
-  int max_iterations = 40;       ///< >= 1
+  int max_iterations = 30;       ///< >= 1
   double convergence_m = 5e-4;   ///< stop when a step moves the points by less (rms)
   double robust_scale_m = 0.05;  ///< Cauchy weight 1 / (1 + (residual / scale)^2)
   /// Smallest eigenvalue, relative to the weight of all points, of a direction that counts as
