@@ -14,7 +14,7 @@ packages=(
   dpkg-dev help2man
   # core
   libeigen3-dev libpcl-dev libopencv-dev libyaml-cpp-dev libspdlog-dev libcli11-dev libdlib-dev
-  libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
+  libpng-dev libjpeg-dev libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
   # simulator: rays on meshes
   libembree-dev
   # live page

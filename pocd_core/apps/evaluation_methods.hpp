@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 #include "pocd/eval/evaluation.hpp"
 
 namespace pocd {

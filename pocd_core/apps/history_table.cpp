@@ -113,7 +113,8 @@ void HistoryTable::row(const std::string& kind, const LoggedEvent& logged,
          {"visible_share", number(e.evidence.visible_share), false},
          {"seen_through_share", number(e.evidence.seen_through_share), false},
          {"stationarity_before", number(e.evidence.before.stationarity()), false},
-         {"stationarity_after", number(e.evidence.after.stationarity()), false}});
+         {"stationarity_after", number(e.evidence.after.stationarity()), false},
+         {"arrival", e.kind == EventKind::kAdded ? to_string(e.arrival) : "", true}});
 }
 
 StampNs parse_time(const std::string& text) {

@@ -9,7 +9,7 @@
 
 #include "map_memory.hpp"
 #include "pocd/config/run_summary.hpp"
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 
 namespace pocd {
 

@@ -3,7 +3,7 @@
 #include <iostream>
 
 #include "pocd/common/check.hpp"
-#include "pocd/output/change_report.hpp"
+#include "pocd/eval/change_report.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 
 int main(int argc, char** argv) {

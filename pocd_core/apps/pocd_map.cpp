@@ -8,7 +8,7 @@
 #include "map_run.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
-#include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/datasets/dataset_options_cli.hpp"
 #include "pocd/config/node_config.hpp"
 
 namespace {

@@ -3,7 +3,7 @@
 
 #include "apps/common.hpp"
 #include "pocd/config/config_io.hpp"
-#include "pocd/config/dataset_options_cli.hpp"
+#include "pocd/datasets/dataset_options_cli.hpp"
 #include "pocd/config/node_config.hpp"
 #include "pocd/network/segmentation_network.hpp"
 #include "pocd_dds/play/player.hpp"

@@ -112,6 +112,7 @@ pocd_msgs::msg::ObjectEvent event_message(const ObjectEvent& event, const MapRun
     message.absorbed_uuid(object_uuid(run.names(), *event.absorbed));
     message.absorbed_local_id(to_index(*event.absorbed));
   }
+  message.arrival(static_cast<std::uint8_t>(event.arrival));
   pocd_msgs::msg::Evidence evidence;
   evidence.delta(event.evidence.delta_m);
   evidence.stationarity_class(static_cast<std::uint8_t>(event.evidence.stationarity_class));
@@ -144,6 +145,9 @@ ObjectEvent event_from(const pocd_msgs::msg::ObjectEvent& message) {
   if (message.has_previous_box()) event.previous_box = box_from(message.previous_box());
   if (message.absorbed_local_id() != 0)
     event.absorbed = static_cast<ObjectId>(message.absorbed_local_id());
+  // What a later program may call it is not known to this one.
+  if (message.arrival() <= static_cast<std::uint8_t>(Arrival::kArrived))
+    event.arrival = static_cast<Arrival>(message.arrival());
   const auto& evidence = message.evidence();
   event.evidence.delta_m = evidence.delta();
   event.evidence.stationarity_class = evidence.stationarity_class();

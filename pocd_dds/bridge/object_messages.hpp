@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "pocd/pipeline/frame_result.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_msgs.h"
 

@@ -8,9 +8,9 @@
 
 #include "map_msgs.h"
 #include "nav_msgs.h"
+#include "pocd/input/class_map.hpp"
 #include "pocd/map/mesh.hpp"
-#include "pocd/pipeline/frame_result.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd_dds/bridge/occupancy_projection.hpp"
 #include "pocd_dds/bridge/surface_points.hpp"
 #include "rmf_obstacle_msgs.h"

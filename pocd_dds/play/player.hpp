@@ -9,7 +9,7 @@
 #include <string>
 
 #include "pocd/config/node_config.hpp"
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/input/dataset_reader.hpp"
 #include "pocd_dds/bridge/conversions.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "rosgraph_msgsPubSubTypes.h"

@@ -85,6 +85,7 @@ Json event_json(const pocd_msgs::msg::ObjectEvent& message, std::uint64_t number
                {"box", box_json(event.box)}};
   if (event.previous_box) json["previous"] = box_json(*event.previous_box);
   if (event.absorbed) json["absorbed"] = to_index(*event.absorbed);
+  if (event.kind == EventKind::kAdded) json["arrival"] = to_string(event.arrival);
   json["evidence"] = {{"rule", evidence.rule},
                       {"delta", rounded(evidence.delta_m)},
                       {"sigma", rounded(evidence.measurement_sigma_m)},

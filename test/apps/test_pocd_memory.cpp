@@ -87,6 +87,7 @@ TEST_F(Memory, HistoryAndCopies) {
   const CommandResult events = run("pocd_history", {"events", memory()});
   ASSERT_EQ(events.exit_code, 0) << events.err;
   EXPECT_EQ(lines(events.out), lines(file("out", "events.csv")));
+  EXPECT_NE(events.out.find(",found\n"), std::string::npos) << "ADDED ends with its arrival";
   const CommandResult early = run("pocd_history", {"at", memory(), "--time", "0.0"});
   EXPECT_EQ(early.out, "");
   const CommandResult end =

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "icp_scene.hpp"
-#include "pocd/association/assignment.hpp"
+#include "pocd/eval/assignment.hpp"
 
 namespace pocd {
 namespace {

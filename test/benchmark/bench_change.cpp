@@ -1,8 +1,8 @@
 // The published change measure, for a box wall filling the view.
 #include <benchmark/benchmark.h>
 
-#include "pocd/change/ray_traced_change.hpp"
 #include "pocd/common/random.hpp"
+#include "pocd/eval/ray_traced_change.hpp"
 
 namespace pocd {
 namespace {

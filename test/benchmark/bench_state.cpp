@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "pocd/belief/bayesian_update.hpp"
 #include "pocd/common/random.hpp"
-#include "pocd/state/bayesian_update.hpp"
 
 namespace pocd {
 namespace {

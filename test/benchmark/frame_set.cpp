@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "pocd/config/config_io.hpp"
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 #include "pocd/eval/state_truth.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"

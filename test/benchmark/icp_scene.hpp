@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "pocd/association/point_to_plane_icp.hpp"
+#include "pocd/registration/point_to_plane_icp.hpp"
 #include "test_clouds.hpp"
 
 namespace pocd::bench {

@@ -22,7 +22,7 @@ done < <(find "$source_folder/pocd_core" "$prefix/include/pocd" -type f \
   \( -name '*.hpp' -o -name '*.cpp' -o -name '*.h' \) -print0)
 ((checked > 20)) || complain "only $checked files found: wrong folders?"
 
-for library in "$prefix"/lib/libpocd_core.* "$prefix"/lib/libpocd_config.* "$prefix"/lib/libpocd_network.*; do
+for library in "$prefix"/lib/libpocd_{core,memory,io,config,sim,datasets,eval,network}.a; do
   [[ -f $library ]] || { complain "$library is not installed" && continue; }
   if nm --demangle "$library" 2>/dev/null | grep -E 'eprosima|fastdds|fastcdr' >&2; then
     complain "$library uses middleware symbols"
@@ -35,11 +35,13 @@ for program in pocd_map pocd_parameters; do
     complain "$program is linked with middleware"
   fi
 done
-# Only what runs a network loads OpenCV's dnn module.
+# What is on the bus at a site reads no image files, data sets or scenes, and runs no network.
+offline='opencv_dnn|opencv_imgcodecs|libgdal|libpoppler|libhdf5|libpcl|libvtk|libembree'
 for program in pocd_node pocd_mirror pocd_health pocd_view pocd_record; do
   [[ -x $prefix/bin/$program ]] || continue
-  if ldd "$prefix/bin/$program" | grep 'opencv_dnn' >&2; then
-    complain "$program is linked with OpenCV's dnn module"
+  if ldd "$prefix/bin/$program" | grep -E "$offline" >&2; then
+    complain "$program loads what only offline programs need"
   fi
+  echo "$program: $(ldd "$prefix/bin/$program" | grep -c '=>') shared libraries"
 done
 exit $failed

@@ -277,6 +277,18 @@ TEST(Stamps, RoundTripIncludingBeforeTheEpoch) {
   }
 }
 
+TEST(EventMessages, AddedCarriesItsArrival) {
+  ObjectEvent event;
+  event.kind = EventKind::kAdded;
+  for (const Arrival arrival : {Arrival::kUnknown, Arrival::kFound, Arrival::kArrived}) {
+    event.arrival = arrival;
+    EXPECT_EQ(event_from(event_message(event, {0, 1}, ClassMap{}, "map")).arrival, arrival);
+  }
+  pocd_msgs::msg::ObjectEvent later = event_message(event, {0, 1}, ClassMap{}, "map");
+  later.arrival(9);
+  EXPECT_EQ(event_from(later).arrival, Arrival::kUnknown) << "a word of a later program";
+}
+
 TEST(ObjectUuid, IsNeverTheSameForTwoObjectsOrRuns) {
   EXPECT_NE(object_uuid(1, ObjectId{2}), object_uuid(2, ObjectId{1}));
   EXPECT_NE(object_uuid(1, ObjectId{1}), object_uuid(1, ObjectId{256}));

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 #include "pocd/input/pose_quaternion.hpp"
 #include "pocd/map/map_delta.hpp"
 

@@ -1,6 +1,6 @@
 #include <yaml-cpp/yaml.h>
 
-#include "parameter_text.hpp"
+#include "../common/parameter_text.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
 

@@ -1,41 +1,13 @@
 #include <functional>
 
-#include "parameter_text.hpp"
+#include "../common/parameter_text.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/check_parameters.hpp"
 #include "pocd/config/config_io.hpp"
 #include "yaml_loader.hpp"
 
 namespace pocd::config_detail {
 namespace {
-
-/// Collects the broken rules between parameters once all files are in.
-class RuleCheck final : public ParameterSink {
- public:
-  void real(const char*, double&, const Range&, const char*) override {}
-  void integer(const char*, int&, const Range&, const char*) override {}
-  void natural(const char*, std::uint64_t&, const Range&, const char*) override {}
-  void boolean(const char*, bool&, const char*) override {}
-  void text(const char*, std::string&, const char*) override {}
-  void choice(const char*, std::string&, const Choices&, const char*) override {}
-  void texts(const char*, std::vector<std::string>&, const char*) override {}
-  void items(const char* name, ItemList& list, const char*) override {
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      path_.push_back(std::string(name) + "[" + std::to_string(i) + "]");
-      list.describe_item(i, *this);
-      path_.pop_back();
-    }
-  }
-  void begin_group(const char* name, const char*) override { path_.push_back(name); }
-  void end_group() override { path_.pop_back(); }
-  void inconsistent(const std::string& problem) override {
-    problems.push_back((path_.empty() ? "" : join(path_, ".") + ": ") + problem);
-  }
-
-  std::vector<std::string> problems;
-
- private:
-  std::vector<std::string> path_;
-};
 
 /// "a.b=c" as the document "a: {b: c}".
 YAML::Node parse_override(const std::string& text) {
@@ -96,9 +68,9 @@ void load(const ShowTo& show, const std::vector<std::filesystem::path>& files,
         show, option + " " + text, false, [&] { return parse_override(text); }, problems);
   }
   if (problems.empty()) {  // rules need values that are valid one by one
-    RuleCheck rules;
+    ParameterCheck rules;
     show(rules);
-    problems = rules.problems;
+    problems = rules.problems();
   }
   if (problems.empty()) return;
   if (problems.size() == 1) throw InputError(problems.front());

@@ -1,5 +1,5 @@
 // The parameter page: one table per group, the fields of list entries in a table of their own.
-#include "parameter_text.hpp"
+#include "../common/parameter_text.hpp"
 #include "pocd/config/config_io.hpp"
 
 namespace pocd::config_detail {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "parameter_text.hpp"
+#include "../common/parameter_text.hpp"
 
 namespace pocd::config_detail {
 namespace {

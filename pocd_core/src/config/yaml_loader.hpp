@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/config/parameter_sink.hpp"
+#include "pocd/common/parameter_sink.hpp"
 
 namespace pocd::config_detail {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pocd/common/check.hpp"
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/input/dataset_reader.hpp"
 
 namespace pocd {
 

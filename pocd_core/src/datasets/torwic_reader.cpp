@@ -4,7 +4,7 @@
 #include "listed_reader.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
-#include "pocd/sim/scenario.hpp"
+#include "pocd/input/torwic_camera.hpp"
 #include "text_file.hpp"
 
 namespace pocd {

@@ -5,12 +5,12 @@
 #include <numeric>
 
 #include "perception.hpp"
-#include "pocd/association/assignment.hpp"
-#include "pocd/association/point_to_plane_icp.hpp"
-#include "pocd/change/ray_traced_change.hpp"
+#include "pocd/belief/bayesian_update.hpp"
+#include "pocd/eval/assignment.hpp"
+#include "pocd/eval/ray_traced_change.hpp"
 #include "pocd/eval/surface_points.hpp"
-#include "pocd/map/object_model.hpp"
-#include "pocd/state/bayesian_update.hpp"
+#include "pocd/objects/object_model.hpp"
+#include "pocd/registration/point_to_plane_icp.hpp"
 
 namespace pocd {
 namespace {
@@ -123,9 +123,9 @@ class PublishedMethod final : public MappingMethod {
         if (icp.dissimilarity > own_.max_dissimilarity) continue;
         const Pose T_new_old = icp.T_target_source.inverse();
         const Eigen::Vector3d moved_W = T_new_old * centre_W - centre_W;
-        const double cost = published_cost(
-            moved_W.norm(), Eigen::AngleAxisd(T_new_old.linear()).angle(),
-            thing.object.class_id == observation.class_id, own_);
+        const double cost =
+            published_cost(moved_W.norm(), Eigen::AngleAxisd(T_new_old.linear()).angle(),
+                           thing.object.class_id == observation.class_id, own_);
         if (cost > own_.cutoff_cost) continue;
         const int row = static_cast<int>(i), column = static_cast<int>(j);
         candidates.push_back({row, column, cost});
@@ -145,8 +145,8 @@ class PublishedMethod final : public MappingMethod {
   void verify(const Frame& frame, const Observation& observation, const Alignment& alignment,
               Thing& thing, std::uint32_t& owner) {
     const double delta_m = geometric_change(frame, observation, alignment, thing);
-    const Evidence evidence = update_belief(thing.object.belief, delta_m,
-                                            thing.object.stationarity_class, own_);
+    const Evidence evidence =
+        update_belief(thing.object.belief, delta_m, thing.object.stationarity_class, own_);
     evidence_[thing.object.id] = evidence;
     if (std::abs(evidence.delta_m) > 0.5 * own_.tau_m) return;
     fuse(frame, observation, thing);
@@ -182,8 +182,8 @@ class PublishedMethod final : public MappingMethod {
       if (p_C.z() < kNearestDepth_m || p_C.z() > reach_m) continue;
       const double u = frame.camera.fx * p_C.x() / p_C.z() + frame.camera.cx;
       const double v = frame.camera.fy * p_C.y() / p_C.z() + frame.camera.cy;
-      inside += u >= -0.5 && v >= -0.5 && u < frame.camera.width - 0.5 &&
-                v < frame.camera.height - 0.5;
+      inside +=
+          u >= -0.5 && v >= -0.5 && u < frame.camera.width - 0.5 && v < frame.camera.height - 0.5;
     }
     return static_cast<double>(inside) / static_cast<double>(thing.model.surfels().size());
   }
@@ -262,8 +262,7 @@ class PublishedMethod final : public MappingMethod {
 
   Points icp_source(const Observation& observation) const {
     Points source;
-    const std::size_t step =
-        std::max<std::size_t>(1, observation.points.size() / own_.icp_points);
+    const std::size_t step = std::max<std::size_t>(1, observation.points.size() / own_.icp_points);
     for (std::size_t i = 0; i < observation.points.size(); i += step)
       source.push_back(observation.points[i].point_W);
     return source;
@@ -356,9 +355,8 @@ void merge_overlapping_observations(double min_size_m, Observations& observation
       continue;
     }
     new_index[i] = static_cast<std::int32_t>(kept.size());
-    const auto most = std::max_element(votes[i].begin(), votes[i].end(), [](auto& x, auto& y) {
-      return x.second < y.second;
-    });
+    const auto most = std::max_element(votes[i].begin(), votes[i].end(),
+                                       [](auto& x, auto& y) { return x.second < y.second; });
     list[i].class_id = most->first;
     kept.push_back(std::move(list[i]));
   }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "pocd/association/assignment.hpp"
 #include "pocd/datasets/readers.hpp"
+#include "pocd/eval/assignment.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
 namespace pocd {

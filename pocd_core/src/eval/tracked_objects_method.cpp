@@ -8,10 +8,10 @@
 
 #include "naive_tsdf.hpp"
 #include "perception.hpp"
-#include "pocd/association/assignment.hpp"
-#include "pocd/association/point_to_plane_icp.hpp"
+#include "pocd/eval/assignment.hpp"
 #include "pocd/eval/mapping_method.hpp"
-#include "pocd/map/object_model.hpp"
+#include "pocd/objects/object_model.hpp"
+#include "pocd/registration/point_to_plane_icp.hpp"
 
 namespace pocd {
 namespace {

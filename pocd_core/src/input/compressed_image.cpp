@@ -6,9 +6,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <utility>
+
+#include "pocd/common/image_codec.hpp"
 
 namespace pocd {
 namespace {
@@ -87,12 +88,8 @@ Checked<Picture> decode(const ImageView& image, const Bytes& bytes) {
   if (png && !png_is_whole(bytes)) return damaged(image, "its PNG is cut off or damaged");
   Picture picture;
   picture.lossy = !png;
-  try {
-    const cv::Mat data(1, static_cast<int>(bytes.size), CV_8UC1,
-                       const_cast<std::uint8_t*>(bytes.data));
-    picture.pixels = cv::imdecode(data, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-  }
+  picture.pixels = png ? decode_png(bytes.data, bytes.size, kLargestSide_px)
+                       : decode_jpeg(bytes.data, bytes.size, kLargestSide_px);
   const int type = picture.pixels.type();
   if (picture.pixels.empty()) {
     return damaged(image, std::string("its ") + (png ? "PNG" : "JPEG") + " cannot be decoded");

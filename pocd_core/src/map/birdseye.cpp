@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "birdseye_canvas.hpp"
 #include "birdseye_changes.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/image_codec.hpp"
 
 namespace pocd {
 namespace {
@@ -221,14 +221,9 @@ cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objec
 
 void write_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
                     const std::filesystem::path& file, const BirdseyeOptions& options) {
-  const cv::Mat picture = draw_birdseye(mesh, objects, options);
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), picture);
-  } catch (const cv::Exception&) {
-    written = false;  // an unknown extension; reported like every other failure
-  }
-  if (!written) throw InputError(file.string() + ": picture cannot be written");
+  if (file.extension() != ".png")
+    throw InputError(file.string() + ": pictures are written as .png");
+  write_png(file, draw_birdseye(mesh, objects, options));
 }
 
 }  // namespace pocd

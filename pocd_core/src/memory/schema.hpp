@@ -7,9 +7,9 @@
 #include <string>
 
 #include "database.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd/map/tsdf_map.hpp"
 #include "pocd/memory/warehouse_memory.hpp"
-#include "pocd/segmentation/class_map.hpp"
 #include "stored_state.hpp"
 
 namespace pocd::memory {

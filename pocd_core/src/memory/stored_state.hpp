@@ -9,7 +9,7 @@
 #include "../pipeline/archive_basics.hpp"
 #include "pocd/common/archive.hpp"
 #include "pocd/map/map_delta.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
 namespace pocd {
@@ -22,11 +22,13 @@ void archive(Archive& a, MapDigest& d) {
 template <class Archive>
 void archive(Archive& a, ObjectEvent& event) {
   auto& [sequence, kind, object, class_id, stamp_ns, frame_sequence, robot, box, previous_box,
-         absorbed, evidence, last_there_ns, first_gone_ns, by] = event;
-  a.version(1);
+         absorbed, arrival, evidence, last_there_ns, first_gone_ns, by] = event;
+  const std::uint8_t layout = a.version(2, 1);
   a(sequence, kind, object, class_id, stamp_ns, frame_sequence, robot, box, previous_box, absorbed,
     evidence, last_there_ns, first_gone_ns, by);
+  if (layout >= 2) a(arrival);
   if constexpr (Archive::kLoads) {
+    if (arrival > Arrival::kArrived) a.fail("has an arrival of no known kind");
     if (kind < EventKind::kAdded || kind > EventKind::kOperator) a.fail("is of no known kind");
   }
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pocd/association/associate.hpp"
+#include "pocd/observe/align_in_place.hpp"
 
 namespace pocd {
 namespace {

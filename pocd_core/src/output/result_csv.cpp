@@ -63,7 +63,7 @@ constexpr const char* kEventsHeader =
     "k,c1,c2,"
     "visible_share,seen_through_share,measurement_sigma,stationarity_before,alpha_before,"
     "beta_before,mu_before,sigma_before,stationarity_after,alpha_after,beta_after,mu_after,"
-    "sigma_after";
+    "sigma_after,arrival";
 
 }  // namespace
 
@@ -128,6 +128,8 @@ void EventsCsv::add(const ObjectEvent& event, const std::string& class_name) {
           number(evidence.seen_through_share), number(evidence.measurement_sigma_m)});
   append(cells, belief_cells(evidence.before));
   append(cells, belief_cells(evidence.after));
+  // Last, for readers that go by position. Empty: no ADDED, and so no arrival.
+  cells.push_back(event.kind == EventKind::kAdded ? to_string(event.arrival) : "");
   file_.row(cells);
 }
 

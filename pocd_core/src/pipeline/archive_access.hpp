@@ -10,7 +10,7 @@
 #include "frame_clock.hpp"
 #include "ignored_regions.hpp"
 #include "looked_at.hpp"
-#include "pocd/pipeline/pose_gate.hpp"
+#include "pocd/input/pose_gate.hpp"
 #include "pocd/segmentation/planes.hpp"
 
 namespace pocd {

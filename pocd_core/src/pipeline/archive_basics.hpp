@@ -1,10 +1,10 @@
 // Archives of the small structs that others consist of.
 #pragma once
 
+#include "pocd/belief/belief.hpp"
 #include "pocd/common/archive.hpp"
 #include "pocd/common/types.hpp"
-#include "pocd/pipeline/frame_result.hpp"
-#include "pocd/state/object_state.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "archive_basics.hpp"
-#include "pocd/map/object_library.hpp"
+#include "pocd/objects/object_library.hpp"
 #include "pocd/track/departures.hpp"
 
 namespace pocd {

@@ -14,6 +14,7 @@
 #include "operator_acts.hpp"
 #include "pipeline_archive.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/check_parameters.hpp"
 #include "pocd/common/cpu_time.hpp"
 #include "pocd/segmentation/things.hpp"
 
@@ -58,7 +59,8 @@ struct PocdPipeline::Impl {
         classes(c.classes),
         pool(c.threads),
         pose_gate(c.pose_gate),
-        tracker(c),
+        tracker(TrackerConfig{c.depth_noise, c.classes, c.segmentation, c.association, c.change,
+                              c.state, c.map}),
         map(c.map),
         looked_at(c.map.voxel_size_m) {}
 
@@ -104,7 +106,10 @@ struct PocdPipeline::Impl {
   void integrate(const Frame& frame);
 };
 
-PocdPipeline::PocdPipeline(const PipelineConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+PocdPipeline::PocdPipeline(const PipelineConfig& config) {
+  check_parameters(config, "configuration of the pipeline");
+  impl_ = std::make_unique<Impl>(config);
+}
 PocdPipeline::~PocdPipeline() = default;
 
 FrameResult PocdPipeline::process_frame(const Frame& frame) {

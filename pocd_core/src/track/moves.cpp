@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pocd/association/associate.hpp"
-#include "pocd/association/point_to_plane_icp.hpp"
+#include "pocd/observe/align_in_place.hpp"
+#include "pocd/registration/point_to_plane_icp.hpp"
 #include "tracker_step.hpp"
 
 namespace pocd {

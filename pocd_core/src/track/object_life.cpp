@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pocd/association/associate.hpp"
 #include "pocd/common/cell_index.hpp"
-#include "pocd/state/lifecycle.hpp"
+#include "pocd/observe/align_in_place.hpp"
+#include "pocd/track/apply_measurement.hpp"
 #include "tracker_step.hpp"
 
 namespace pocd {

@@ -5,9 +5,9 @@
 #include <limits>
 #include <utility>
 
-#include "pocd/change/geometric_change.hpp"
 #include "pocd/common/cell_index.hpp"
-#include "pocd/state/lifecycle.hpp"
+#include "pocd/observe/geometric_change.hpp"
+#include "pocd/track/apply_measurement.hpp"
 
 namespace pocd {
 namespace {
@@ -36,7 +36,7 @@ std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Eigen::Vecto
   return PixelView{p.z(), cloud.depth_m[static_cast<std::size_t>(row) * cloud.width + col]};
 }
 
-ObjectTracker::ObjectTracker(const PipelineConfig& config)
+ObjectTracker::ObjectTracker(const TrackerConfig& config)
     : config_(config),
       free_space_(std::max(2.0 * config.map.voxel_size_m, config.map.max_depth_m / kViewCells)) {}
 
@@ -370,6 +370,7 @@ ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryO
   event.frame_sequence = step.frame.sequence;
   event.robot = step.frame.robot;
   event.box = object.box;
+  if (kind == EventKind::kAdded) event.arrival = object.arrival;
   event.evidence = evidence_of(step, object);
   event.evidence.rule = rule;
   step.result.events.push_back(std::move(event));

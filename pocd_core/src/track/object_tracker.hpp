@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "pocd/association/associate.hpp"
 #include "pocd/map/tsdf_map.hpp"
+#include "pocd/objects/frame_result.hpp"
+#include "pocd/observe/align_in_place.hpp"
 #include "pocd/observe/free_space.hpp"
 #include "pocd/observe/look.hpp"
 #include "pocd/observe/parts.hpp"
-#include "pocd/pipeline/frame_result.hpp"
-#include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/segmentation/planes.hpp"
 #include "pocd/track/departures.hpp"
+#include "pocd/track/tracker_config.hpp"
 
 namespace pocd {
 
@@ -26,7 +26,7 @@ struct IcpResult;
 /// Owns the object library. Not thread-safe.
 class ObjectTracker {
  public:
-  explicit ObjectTracker(const PipelineConfig& config);
+  explicit ObjectTracker(const TrackerConfig& config);
 
   const ObjectLibrary& library() const { return library_; }
 
@@ -153,7 +153,7 @@ class ObjectTracker {
   /// Surfels that make a piece of surface of the least area that counts.
   std::size_t least_surfels() const;
 
-  PipelineConfig config_;
+  TrackerConfig config_;
   ObjectLibrary library_;
   FreeSpace free_space_;
   Departures departures_;

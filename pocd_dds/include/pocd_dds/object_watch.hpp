@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd_dds/callbacks.hpp"
 
 namespace pocd {

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "pocd/config/config_io.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd/input/depth_noise.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
-#include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 
 namespace pocd {
 

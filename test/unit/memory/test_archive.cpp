@@ -1,6 +1,7 @@
 // Values to bytes and back.
 #include <gtest/gtest.h>
 
+#include "memory/stored_state.hpp"
 #include "pocd/common/archive.hpp"
 #include "pocd/common/random.hpp"
 
@@ -108,6 +109,31 @@ TEST(Archive, BytesThatAreLeftAreAnError) {
   bytes.push_back(0);
   Sample copy;
   EXPECT_THROW(unarchive(bytes, "here", copy), InputError);
+}
+
+// The log of events is kept for years: one of before there were arrivals is read.
+TEST(StoredEvent, OneOfAnOlderLayoutHasAnUnknownArrival) {
+  ObjectEvent event;
+  event.kind = EventKind::kAdded;
+  event.arrival = Arrival::kArrived;
+  event.robot = "robot1";
+  event.by = "somebody";
+  std::vector<std::uint8_t> bytes = archived(event);
+  ObjectEvent read;
+  unarchive(bytes, "row", read);
+  EXPECT_EQ(read.arrival, Arrival::kArrived);
+  bytes.back() = 7;
+  EXPECT_THROW(unarchive(bytes, "row", read), InputError);
+  bytes.pop_back();  // layout 1 ended here
+  EXPECT_THROW(unarchive(bytes, "row", read), InputError);
+  bytes.front() = 1;
+  ObjectEvent old;
+  unarchive(bytes, "row", old);
+  EXPECT_EQ(old.arrival, Arrival::kUnknown);
+  EXPECT_EQ(old.robot, "robot1");
+  EXPECT_EQ(old.by, "somebody");
+  bytes.front() = 3;
+  EXPECT_THROW(unarchive(bytes, "row", old), InputError);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "pocd/common/check.hpp"
-#include "pocd/output/change_report.hpp"
+#include "pocd/eval/change_report.hpp"
 #include "pocd/output/result_csv.hpp"
 #include "run_command.hpp"
 
@@ -46,6 +46,26 @@ TEST(ResultCsv, EventsReadBack) {
   EXPECT_EQ(events[1].class_name, "box of \"steel\"") << "a row is a line";
 }
 
+// Last, so that readers by position go on.
+TEST(ResultCsv, AddedHasItsArrivalInTheLastColumn) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "events.csv";
+  EventsCsv csv(file);
+  ObjectEvent event = moved_event();
+  csv.add(event, "box");
+  event.kind = EventKind::kAdded;
+  for (const Arrival arrival : {Arrival::kUnknown, Arrival::kFound, Arrival::kArrived}) {
+    event.arrival = arrival;
+    csv.add(event, "box");
+  }
+  csv.close();
+  std::istringstream text(read_text(file));
+  std::vector<std::string> last;
+  for (std::string line; std::getline(text, line);)
+    last.push_back(line.substr(line.rfind(',') + 1));
+  EXPECT_EQ(last, (std::vector<std::string>{"arrival", "", "unknown", "found", "arrived"}));
+}
+
 TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "objects.csv";
@@ -60,8 +80,8 @@ TEST(ResultCsv, ObjectsHaveOneCellPerColumn) {
   const std::string row = text.substr(text.find('\n') + 1);
   EXPECT_EQ(
       row,
-      "5,7,box,0,0.000000,0.000000,0.000000,0.000000,1.000000,0.500000,2.000000,0.000000,0.67,0.67,"
-      "0.33,0,0.5,0,0,0,robot1\n");
+      "5,7,box,0,0.000000,0.000000,0.000000,0.000000,1.000000,0.500000,2.000000,0.000000,0.67,2.01,"
+      "0.99,0,0.5,0,0,0,robot1\n");
   EXPECT_EQ(std::count(text.begin(), text.begin() + static_cast<long>(text.find('\n')), ','),
             std::count(row.begin(), row.end(), ','));
 }

@@ -5,10 +5,10 @@
 #include <map>
 #include <set>
 
+#include "pocd/belief/bayesian_update.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
-#include "pocd/state/bayesian_update.hpp"
 #include "test_room.hpp"
 
 namespace pocd {
@@ -36,8 +36,9 @@ bool rule_holds(const ObjectEvent& event, const PipelineConfig& config) {
     return e.after.stationarity() < config.state.remove_below;
   if (e.rule == "aligned_elsewhere") return event.kind == EventKind::kMoved && e.after.mu == 0.0;
   // What is left or taken away of a surface, or who is who, is no matter of the belief.
-  const std::set<std::string> others{"nothing_left", "part_seen_through", "part_removed", "grew",
-                                     "found_again",  "unknown",           "found",        "arrived"};
+  const std::set<std::string> others{
+      "nothing_left", "part_seen_through", "part_removed", "grew",
+      "found_again",  "unknown",           "found",        "arrived"};
   return others.count(e.rule) > 0 || e.rule.rfind("joined_", 0) == 0;
 }
 

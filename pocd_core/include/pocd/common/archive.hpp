@@ -41,7 +41,10 @@ class SaveArchive {
   void operator()(const Values&... values);
 
   /// Number of the layout of what follows, so that a later program can tell.
-  void version(std::uint8_t known) { raw(&known, 1); }
+  std::uint8_t version(std::uint8_t known, std::uint8_t /*oldest*/ = 0) {
+    raw(&known, 1);
+    return known;
+  }
   void raw(const void* from, std::size_t size) {
     const auto* bytes = static_cast<const std::uint8_t*>(from);
     bytes_.insert(bytes_.end(), bytes, bytes + size);
@@ -74,12 +77,14 @@ class LoadArchive {
   template <class... Values>
   void operator()(Values&... values);
 
-  void version(std::uint8_t known) {
+  /// The layout that was written: `known`, or an older one from `oldest` on, 0 being none.
+  std::uint8_t version(std::uint8_t known, std::uint8_t oldest = 0) {
     std::uint8_t found = 0;
     raw(&found, 1);
-    if (found != known) {
+    if (found != known && (oldest == 0 || found < oldest || found > known)) {
       fail("layout " + std::to_string(found) + ", this program knows " + std::to_string(known));
     }
+    return found;
   }
   void raw(void* to, std::size_t size) {
     if (size > left()) fail("ends before its time");

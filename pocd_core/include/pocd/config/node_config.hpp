@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 #include "pocd/input/input_config.hpp"
 #include "pocd/memory/memory_config.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"

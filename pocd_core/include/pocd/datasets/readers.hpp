@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 
 namespace pocd {
 

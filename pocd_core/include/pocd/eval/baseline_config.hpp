@@ -2,7 +2,7 @@
 // scenes and seeds other than those that are reported; docs/evaluation.md has the command.
 #pragma once
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 #include "pocd/eval/published_config.hpp"
 
 namespace pocd {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/input/dataset_reader.hpp"
 
 namespace pocd {
 

@@ -7,7 +7,7 @@
 
 #include "pocd/eval/baseline_config.hpp"
 #include "pocd/input/frame.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 
 namespace pocd {

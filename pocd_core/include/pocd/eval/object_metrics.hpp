@@ -6,7 +6,7 @@
 #include <string>
 
 #include "pocd/eval/scene_truth.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 

@@ -3,7 +3,7 @@
 // PipelineConfig: theta_depth is map.max_depth_m.
 #pragma once
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 
 namespace pocd {
 
@@ -43,8 +43,7 @@ struct PublishedConfig {
           "Cost per metre of translation, lambda1 [1/m].");
     visit("lambda_rotation", lambda_rotation, Range{0.0, 1e6},
           "Cost per radian of rotation, lambda2 [1/rad].");
-    visit("lambda_class", lambda_class, Range{0.0, 1e9},
-          "Cost of two different classes, lambda3.");
+    visit("lambda_class", lambda_class, Range{0.0, 1e9}, "Cost of two different classes, lambda3.");
     visit("min_frustum_share", min_frustum_share, Range{0.0, 1.0},
           "An object with this share of its points in the frustum and no observation is "
           "unobserved, theta_vis.");

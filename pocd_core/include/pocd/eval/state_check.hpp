@@ -5,7 +5,7 @@
 #include <string>
 
 #include "pocd/eval/state_truth.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 
 namespace pocd {

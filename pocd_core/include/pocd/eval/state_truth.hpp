@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "pocd/config/describe.hpp"
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/common/describe.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 
 namespace pocd {
 

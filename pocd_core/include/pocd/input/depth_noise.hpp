@@ -1,11 +1,12 @@
 // Standard deviation of a depth measurement as a function of its depth.
 #pragma once
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 
 namespace pocd {
 
-/// sigma(z) = base + quadratic * z^2, the usual stereo model (Khoshelham and Elberink, Sensors 2012).
+/// sigma(z) = base + quadratic * z^2, the usual stereo model (Khoshelham and Elberink, Sensors
+/// 2012).
 struct DepthNoise {
   double base_m = 0.004;
   double quadratic_per_m = 0.003;

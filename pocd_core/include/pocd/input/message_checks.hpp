@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "pocd/input/camera_model.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd/input/input_problem.hpp"
 #include "pocd/input/transform_tree.hpp"
-#include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pocd/map/mesh.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 
@@ -39,7 +39,8 @@ std::vector<BirdseyeChange> changes_since(const std::vector<ObjectEvent>& events
 cv::Mat draw_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
                       const BirdseyeOptions& options = {});
 
-/// Draws and writes a PNG. Throws InputError naming the file when it cannot be written.
+/// Draws and writes a PNG. Throws InputError naming the file when it is not called .png or cannot
+/// be written.
 void write_birdseye(const Mesh& mesh, const std::vector<ObjectSnapshot>& objects,
                     const std::filesystem::path& file, const BirdseyeOptions& options = {});
 

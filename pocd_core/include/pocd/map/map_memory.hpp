@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 
 namespace pocd {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "pocd/common/describe.hpp"
 #include "pocd/common/thread_pool.hpp"
 #include "pocd/common/types.hpp"
-#include "pocd/config/describe.hpp"
 #include "pocd/input/frame.hpp"
 #include "pocd/map/map_memory.hpp"
 #include "pocd/map/region_source.hpp"

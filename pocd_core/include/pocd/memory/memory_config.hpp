@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 
 namespace pocd {
 

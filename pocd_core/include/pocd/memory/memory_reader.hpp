@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "pocd/map/map_delta.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 

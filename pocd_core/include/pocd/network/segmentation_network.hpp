@@ -6,8 +6,8 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 
-#include "pocd/datasets/dataset_reader.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/input/class_map.hpp"
+#include "pocd/input/dataset_reader.hpp"
 
 namespace pocd {
 

@@ -8,8 +8,8 @@
 #include <set>
 #include <unordered_map>
 
-#include "pocd/association/visibility.hpp"
 #include "pocd/map/voxel_block.hpp"
+#include "pocd/observe/visibility.hpp"
 
 namespace pocd {
 

@@ -3,10 +3,10 @@
 
 #include <optional>
 
-#include "pocd/association/association_config.hpp"
-#include "pocd/association/visibility.hpp"
-#include "pocd/change/change_config.hpp"
-#include "pocd/map/object_library.hpp"
+#include "pocd/belief/change_config.hpp"
+#include "pocd/objects/object_library.hpp"
+#include "pocd/observe/association_config.hpp"
+#include "pocd/observe/visibility.hpp"
 
 namespace pocd {
 

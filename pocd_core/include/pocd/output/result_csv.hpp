@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pocd/input/frame.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 

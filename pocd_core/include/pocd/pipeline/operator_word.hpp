@@ -5,7 +5,7 @@
 #include <string>
 
 #include "pocd/common/polygon.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 
 namespace pocd {
 

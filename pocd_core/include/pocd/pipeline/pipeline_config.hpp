@@ -5,16 +5,16 @@
 #include <string>
 #include <vector>
 
-#include "pocd/association/association_config.hpp"
-#include "pocd/change/change_config.hpp"
-#include "pocd/config/describe.hpp"
+#include "pocd/belief/change_config.hpp"
+#include "pocd/belief/state_config.hpp"
+#include "pocd/common/describe.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd/input/depth_noise.hpp"
+#include "pocd/input/pose_gate.hpp"
 #include "pocd/map/tsdf_map.hpp"
-#include "pocd/pipeline/pose_gate.hpp"
-#include "pocd/pipeline/pose_refinement.hpp"
-#include "pocd/segmentation/class_map.hpp"
+#include "pocd/observe/association_config.hpp"
+#include "pocd/observe/pose_refinement.hpp"
 #include "pocd/segmentation/segmentation_config.hpp"
-#include "pocd/state/state_config.hpp"
 
 namespace pocd {
 

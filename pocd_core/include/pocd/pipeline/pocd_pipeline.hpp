@@ -6,7 +6,7 @@
 
 #include "pocd/input/frame.hpp"
 #include "pocd/map/tsdf_map.hpp"
-#include "pocd/pipeline/frame_result.hpp"
+#include "pocd/objects/frame_result.hpp"
 #include "pocd/pipeline/operator_word.hpp"
 #include "pocd/pipeline/pipeline_config.hpp"
 #include "pocd/pipeline/pipeline_pieces.hpp"
@@ -23,6 +23,8 @@ struct RegionLook {
 /// and gives the same bits for every number of them.
 class PocdPipeline {
  public:
+  /// Throws InputError that names every field with a value that is not allowed, as a file of
+  /// parameters would.
   explicit PocdPipeline(const PipelineConfig& config);
   ~PocdPipeline();
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "pocd/common/thread_pool.hpp"
+#include "pocd/input/class_map.hpp"
 #include "pocd/input/frame.hpp"
-#include "pocd/segmentation/class_map.hpp"
 
 namespace pocd {
 
@@ -38,21 +38,6 @@ struct ViewBall {
   double radius_m = 0.0;
 };
 ViewBall view_ball(const OrganizedCloud& cloud, double max_depth_m);
-
-/// ClassMap as a table for pixel loops. Two classes with one name are one class: the one listed
-/// first (masks of one kind of thing may alias between two indices).
-class ClassTable {
- public:
-  explicit ClassTable(const ClassMap& map);
-  ClassId canonical(ClassId id) const { return id < canonical_.size() ? canonical_[id] : id; }
-  ClassRole role(ClassId id) const {
-    return id < role_.size() ? role_[id] : ClassRole::kBackground;
-  }
-
- private:
-  std::vector<ClassId> canonical_;
-  std::vector<ClassRole> role_;
-};
 
 /// Step 1 of the method: back-projects up to `max_depth_m` and attaches classes. A grid pixel takes
 /// the first of its image pixels, in row order, that has a return. Reuses the memory of `cloud`.

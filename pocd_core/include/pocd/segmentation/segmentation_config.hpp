@@ -1,7 +1,7 @@
 // Parameters of the way from a frame to observations.
 #pragma once
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 
 namespace pocd {
 

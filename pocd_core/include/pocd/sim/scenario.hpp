@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/input/torwic_camera.hpp"
 #include "pocd/sim/robot_path.hpp"
 #include "pocd/sim/scene.hpp"
 #include "pocd/sim/sensor_model.hpp"
@@ -38,12 +38,6 @@ struct Scenario {
   SensorModel sensor;
   std::vector<SimVisit> visits;
 };
-
-/// Camera and mount of TorWIC's front camera (method.md): 640x360, pitched up by 15 degrees. The
-/// base frame is put 0.4 m above the floor, so the lens is at 0.41 m and sees a 2 m stack, 0.7 m to
-/// its side, from 1 m ahead on.
-CameraModel torwic_camera();
-CameraExtrinsics torwic_extrinsics();
 
 /// Floor slab and four walls around the area, as fixtures.
 std::vector<SceneObject> make_building(const Eigen::Vector2d& low_m, const Eigen::Vector2d& high_m,

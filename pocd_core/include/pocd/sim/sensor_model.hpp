@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 #include "pocd/input/frame.hpp"
 
 namespace pocd {
 
-/// Works on images alone, whatever made them. Every effect can be switched off by its own field (0),
-/// and those of borders and far ranges are off unless asked for. The same seed and frame number give
-/// the same errors, whatever was rendered before.
+/// Works on images alone, whatever made them. Every effect can be switched off by its own field
+/// (0), and those of borders and far ranges are off unless asked for. The same seed and frame
+/// number give the same errors, whatever was rendered before.
 struct SensorModel {
   double depth_base_m = 0.002;
   double depth_quadratic_per_m = 0.0025;

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "pocd/common/thread_pool.hpp"
-#include "pocd/datasets/dataset_reader.hpp"
+#include "pocd/input/dataset_reader.hpp"
 #include "pocd/sim/render.hpp"
 #include "pocd/sim/robot_path.hpp"
 #include "pocd/sim/scenario.hpp"

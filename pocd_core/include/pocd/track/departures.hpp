@@ -4,7 +4,7 @@
 #include <deque>
 #include <functional>
 
-#include "pocd/map/object_library.hpp"
+#include "pocd/objects/object_library.hpp"
 
 namespace pocd {
 
