@@ -123,6 +123,47 @@ TEST(Things, TwoWallsOfDifferentHeightAreTwo) {
   EXPECT_NE(observation_at(s, {0, 2.08, 0.5}), near);
 }
 
+TEST(Things, OfTwoContainersInARowEachIsOne) {
+  // The far wall of the first one stands before the near wall of the second one, as high.
+  const Pose above = test::look_from({0, 0.3, 1.5}, 0.0);
+  const auto s =
+      things_in(room_with({open_box({0, 1.6}, 0.8, 0.3, 0.3), open_box({0, 2.25}, 0.8, 0.3, 0.3)}),
+                above, near_config());
+  const std::int32_t first = observation_at(s, {0, 1.43, 0.2});
+  const std::int32_t second = observation_at(s, {0, 2.385, 0.28});
+  ASSERT_NE(first, Observations::kNone);
+  ASSERT_NE(second, Observations::kNone);
+  EXPECT_NE(first, second);
+}
+
+// Masks of classes say what is a box, not how many boxes there are.
+TEST(Pieces, WithMasksOfClassesABoxBehindAPostIsOneToo) {
+  const PipelineConfig config = near_config();
+  const auto pieces = [&](ClassId post_class) {
+    GroundModel ground;
+    const auto s = test::segment(shoot(room_with({solid(kBoxClass, {0, 2.2}, {1.2, 0.4, 0.6}),
+                                                  solid(post_class, {0, 1.5}, {0.15, 0.1, 1.0})}),
+                                       viewpoint()),
+                                 config, ground);
+    return std::make_pair(observation_at(s, {-0.5, 2.0, 0.3}), observation_at(s, {0.5, 2.0, 0.3}));
+  };
+  for (const ClassId post_class : {test::kCageClass, kBoxClass}) {
+    const auto [left, right] = pieces(post_class);
+    EXPECT_NE(left, Observations::kNone) << post_class;
+    EXPECT_EQ(left, right) << post_class;
+  }
+}
+
+TEST(Pieces, OfTwoClassesStayTwo) {
+  GroundModel ground;
+  const auto s = test::segment(
+      shoot(room_with({solid(kBoxClass, {-0.35, 2.2}, {0.5, 0.4, 0.6}),
+                       solid(test::kCageClass, {0.35, 2.2}, {0.5, 0.4, 0.6}), post()}),
+            viewpoint()),
+      near_config(), ground);
+  EXPECT_NE(observation_at(s, {-0.5, 2.0, 0.3}), observation_at(s, {0.5, 2.0, 0.3}));
+}
+
 TEST(Things, AWallThatGoesOnShowsNoSide) {
   const auto s = things_in(room_with({}), viewpoint());
   const std::int32_t wall = observation_at(s, {0, 3.5, 1.1});
