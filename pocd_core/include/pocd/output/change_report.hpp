@@ -24,6 +24,12 @@ struct ReportedEvent {
 /// Reads what EventsCsv wrote, in order. Throws InputError naming file, line and column.
 std::vector<ReportedEvent> read_events_csv(const std::filesystem::path& file);
 
+/// One line: "MOVED box #4 (1.00, 2.00) -> (1.50, 2.00)".
+std::string describe(const ReportedEvent& event);
+
+/// What the events say in the end: without an ADDED or REMOVED that a later MOVED takes back.
+std::vector<ReportedEvent> last_words(const std::vector<ReportedEvent>& events);
+
 struct ChangeRow {
   std::string visit, truth, reported;
   bool right = false;
@@ -38,9 +44,10 @@ struct ChangeReport {
   std::size_t right_changes = 0;  ///< of those
 };
 
-/// A truth is rightly reported by the first unused event of its kind whose place is within `radius_m`
-/// horizontally of the true one (MOVED: both places). For the others the row shows one unused event of
-/// any kind near by (two for a move, so REMOVED and ADDED), which does not make it right.
+/// A truth is rightly reported by the first unused event of its kind whose place is within
+/// `radius_m` horizontally of the true one (MOVED: both places). For the others the row shows one
+/// unused event of any kind near by (two for a move, so REMOVED and ADDED), which does not make it
+/// right.
 ChangeReport compare_changes(const Scenario& scenario, const std::vector<ReportedEvent>& events,
                              double radius_m);
 
