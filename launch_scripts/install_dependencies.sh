@@ -9,7 +9,7 @@ packages=(
   python3-colcon-package-selection python3-colcon-output python3-colcon-parallel-executor
   # bus; fastddsgen runs on Java but does not depend on it
   fastddsgen default-jre-headless fastdds-tools libfastrtps-dev libfastcdr-dev
-  libsystemd-dev pkg-config
+  libsystemd-dev pkg-config prometheus-cpp-dev
   # packages and their man pages
   dpkg-dev help2man
   # core

@@ -1,50 +1,62 @@
 // Says how the component is, in one line: for containers, services and people.
 #include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <thread>
 
 #include "apps/common.hpp"
 #include "pocd_dds/entities/reader.hpp"
+#include "pocd_dds/watch/health_line.hpp"
+#include "pocd_dds/watch/health_socket.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
 namespace {
 
 using pocd_msgs::msg::NodeHealth;
 
-/// What it waits for, of those robots that do not deliver: "robot1: waiting for odom since 12.3".
-std::string waiting(const NodeHealth& health) {
-  std::string text;
-  for (const auto& robot : health.robots()) {
-    if (robot.frames() > 0 && robot.waiting_for().empty()) continue;
-    text += text.empty() ? "" : "; ";
-    text += robot.name() + ": ";
-    text += robot.waiting_for().empty() ? "waiting for its first frame" : robot.waiting_for();
-  }
-  return text;
-}
-
-void print(const NodeHealth& health) {
-  const std::string waits_for = waiting(health);
-  std::printf("%s %s: %s%s%llu frames processed, %llu dropped, %u objects, map version %llu\n",
-              health.name().c_str(), health.level() < 2 ? "is up" : "fails",
-              health.message().c_str(),
-              waits_for.empty() ? ", " : (", " + waits_for + ", ").c_str(),
-              static_cast<unsigned long long>(health.frames_processed()),
-              static_cast<unsigned long long>(health.frames_dropped()), health.objects(),
-              static_cast<unsigned long long>(health.map_version()));
-}
-
 struct Question {
   std::string name = "pocd_node";
   double timeout_s = 10.0;
   bool ready = false;  ///< it has to be ready, too
+  std::filesystem::path socket;
 };
 
-int check(const pocd::dds::BusOptions& bus, const Question& question) {
-  using Clock = std::chrono::steady_clock;
+using Clock = std::chrono::steady_clock;
+
+// A node says how it is once a second: what is older was said before it hung.
+constexpr double kNewestS = 3.0;
+
+int say(const std::string& line, bool good) {
+  std::printf("%s\n", line.c_str());
+  return good ? 0 : 1;
+}
+
+/// By the socket of a node of this machine. Without a value: there is none, or it is another
+/// node's, and the bus may know.
+std::optional<int> check_socket(const Question& question, Clock::time_point deadline) {
+  using Seconds = std::chrono::duration<double>;
+  while (!pocd::dds::stop_requested) {
+    const double left_s = Seconds(deadline - Clock::now()).count();
+    const auto word = pocd::dds::ask_health(question.socket, std::max(0.1, left_s));
+    if (!word || word->name != question.name) return std::nullopt;
+    const bool fresh = word->age_s < kNewestS;
+    if (fresh && (word->ready || !question.ready)) return say(word->line, word->good);
+    // Who asks whether it is ready waits for it.
+    if (Clock::now() >= deadline) {
+      if (fresh) return say(word->line, false);
+      return say(fmt::format("{} hangs: it has said nothing for {:.0f} s", word->name, word->age_s),
+                 false);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  return 1;
+}
+
+int check_bus(const pocd::dds::BusOptions& bus, const Question& question,
+              Clock::time_point deadline) {
   pocd::dds::Wakeup wakeup;
   pocd::dds::Reader<pocd_msgs::msg::NodeHealthPubSubType> reader(
       std::make_shared<pocd::dds::Participant>(bus), pocd::dds::topics::kHealth, wakeup);
-  const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                           std::chrono::duration<double>(question.timeout_s));
   while (!pocd::dds::stop_requested && Clock::now() < deadline) {
     wakeup.wait_for(std::chrono::milliseconds(100));
     NodeHealth health;
@@ -54,8 +66,7 @@ int check(const pocd::dds::BusOptions& bus, const Question& question) {
       const bool good = health.level() < 2 && (health.ready() || !question.ready);
       // Who asks whether it is ready waits for it.
       if (!good && question.ready && Clock::now() < deadline) continue;
-      print(health);
-      return good ? 0 : 1;
+      return say(pocd::dds::health_line(health), good);
     }
     if (reader.take_misread() > 0) {
       std::printf("%s: %s\n", reader.topic().c_str(), reader.misread_from().c_str());
@@ -65,6 +76,15 @@ int check(const pocd::dds::BusOptions& bus, const Question& question) {
   std::printf("%s was not %s on domain %d within %g s\n", question.name.c_str(),
               question.ready ? "ready" : "heard", bus.domain, question.timeout_s);
   return 1;
+}
+
+int check(const pocd::dds::BusOptions& bus, const Question& question) {
+  const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                           std::chrono::duration<double>(question.timeout_s));
+  if (!question.socket.empty()) {
+    if (const std::optional<int> code = check_socket(question, deadline)) return *code;
+  }
+  return check_bus(bus, question, deadline);
 }
 
 }  // namespace
@@ -88,6 +108,10 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--ready", question.ready,
                "Wait until it is ready, too: it takes frames and publishes");
+  app.add_option("--socket", question.socket,
+                 "Socket that the node was started with (--health-socket): asks there, and on the "
+                 "bus only when nobody answers")
+      ->envname("POCD_HEALTH_SOCKET");
   int domain = -1;
   pocd::dds::add_bus_options(app, domain, bus.profiles_file, bus.security_folder);
   try {

@@ -1,11 +1,16 @@
 // The component: camera, segmentation and odometry topics in, objects and map deltas out.
 #include <algorithm>
+#include <filesystem>
+#include <memory>
 #include <random>
 
 #include "apps/common.hpp"
 #include "apps/service_notice.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd_dds/node/node.hpp"
+#include "pocd_dds/watch/health_line.hpp"
+#include "pocd_dds/watch/health_socket.hpp"
+#include "pocd_dds/watch/metrics_endpoint.hpp"
 
 namespace {
 
@@ -24,6 +29,26 @@ struct NodeGroup {
     visit.group("node", node, "The component on the bus.");
   }
 };
+
+std::unique_ptr<pocd::dds::MetricsEndpoint> metrics_at(const std::string& address,
+                                                       const pocd::dds::NodeOptions& node) {
+  if (address.empty()) return nullptr;
+  pocd::dds::MetricsOptions options{address, node.bus.name, POCD_VERSION, node.epoch};
+  auto endpoint = std::make_unique<pocd::dds::MetricsEndpoint>(options);
+  spdlog::info("metrics on port {}", endpoint->port());
+  return endpoint;
+}
+
+/// Null, which is said, where none can be made: pocd_health asks on the bus then.
+std::unique_ptr<pocd::dds::HealthSocket> socket_at(const std::filesystem::path& path) {
+  if (path.empty()) return nullptr;
+  try {
+    return std::make_unique<pocd::dds::HealthSocket>(path);
+  } catch (const pocd::InputError& error) {
+    spdlog::warn("--health-socket: {}", error.what());
+    return nullptr;
+  }
+}
 
 constexpr const char* kParametersIntroduction =
     "# Parameters of pocd_node\n\n"
@@ -69,6 +94,15 @@ int main(int argc, char** argv) {
                "Print the page of the parameters under `node` and end");
   app.add_option("--latency", options.latency_file,
                  "File for the time that each frame took from its last image to its map delta");
+  std::string metrics;
+  std::filesystem::path health_socket;
+  app.add_option("--metrics", metrics,
+                 "[ADDRESS:]PORT where Prometheus finds /metrics; without an address of this "
+                 "machine only; default: nowhere")
+      ->envname("POCD_METRICS");
+  app.add_option("--health-socket", health_socket,
+                 "Socket for pocd_health --socket, which then needs no participant; default: none")
+      ->envname("POCD_HEALTH_SOCKET");
   int domain = -1;
   pocd::dds::add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
@@ -105,8 +139,16 @@ int main(int argc, char** argv) {
     pocd::dds::stop_on_signals();
     options.epoch = epoch ? *epoch : random_epoch();
     pocd::dds::ServiceNotice service;
-    options.on_status = [&](const pocd::dds::NodeState& state, bool ending) {
-      service.tell(state, ending);
+    const auto endpoint = metrics_at(metrics, options);
+    const auto socket = socket_at(health_socket);
+    options.on_status = [&](const pocd::dds::NodeReport& report,
+                            const pocd_msgs::msg::NodeHealth& health) {
+      service.tell(report);
+      if (endpoint) endpoint->update(report);
+      if (socket) {
+        socket->update({health.name(), pocd::dds::health_line(health), health.level() < 2,
+                        health.ready(), 0.0});
+      }
     };
     pocd::dds::Node node(options);
     spdlog::info("running on domain {}, epoch {:016x}, {} robot(s) named{}", options.bus.domain,

@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
   options.bus.name = "pocd_record";
   std::vector<std::string> topics;
   std::string compression = "zstd";
-  double split_mb = 0.0, split_s = 0.0, queue_mb = 512.0;
+  double split_mb = 0.0, split_s = 0.0, ring_mb = 0.0, queue_mb = 512.0;
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--output", options.output, "File to write; with --split-*, FILE_0000.mcap ...")
       ->required();
@@ -78,6 +78,10 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.1, 1e9));
   app.add_option("--split-duration", split_s, "Begin another file after this many seconds")
       ->check(CLI::Range(0.1, 1e9));
+  app.add_option("--ring", ring_mb,
+                 "Keep the last so many MB: the oldest files are removed, also those of earlier "
+                 "runs, after which it goes on; files of a tenth of it, unless --split-* say so")
+      ->check(CLI::Range(1.0, 1e9));
   app.add_option("--queue", queue_mb, "MB received and not yet written before samples are dropped")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
@@ -85,6 +89,9 @@ int main(int argc, char** argv) {
   pocd::dds::add_bus_options(app, domain, options.bus.profiles_file, options.bus.security_folder);
   try {
     app.parse(argc, argv);
+    if (ring_mb > 0.0 && split_mb > 0.5 * ring_mb) {
+      throw CLI::ValidationError("--split-size", "is more than half of --ring");
+    }
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
@@ -94,7 +101,9 @@ int main(int argc, char** argv) {
   }
   if (!topics.empty()) options.topics = topics;
   options.split.mcap.compression = compression == "none" ? "" : compression;
+  if (ring_mb > 0.0 && split_mb == 0.0) split_mb = 0.1 * ring_mb;
   options.split.most_bytes = static_cast<std::uint64_t>(split_mb * 1e6);
+  options.split.keep_bytes = static_cast<std::uint64_t>(ring_mb * 1e6);
   options.split.most_duration_ns = static_cast<std::uint64_t>(split_s * 1e9);
   options.queue_bytes = static_cast<std::size_t>(queue_mb * 1e6);
 

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "pocd_dds/node/status_publication.hpp"
+#include "pocd_dds/node/node_report.hpp"
 
 namespace pocd::dds {
 
@@ -15,14 +15,15 @@ class ServiceNotice {
  public:
   /// After each status, about once a second: that it is ready, once; a sign of life, unless a
   /// thread hangs; and how it is, for `systemctl status`.
-  void tell(const NodeState& state, bool ending) {
+  void tell(const NodeReport& report) {
+    const NodeState& state = report.state;
     std::string text = "STATUS=" + (state.verdict.why.empty() ? state.word : state.verdict.why);
     if (state.ready && !told_ready_) {
       text += "\nREADY=1";
       told_ready_ = true;
     }
-    if (state.ready || ending) text += "\nWATCHDOG=1";
-    if (ending) text += "\nSTOPPING=1";
+    if (state.ready || report.ending) text += "\nWATCHDOG=1";
+    if (report.ending) text += "\nSTOPPING=1";
     sd_notify(0, text.c_str());
   }
 

@@ -106,7 +106,7 @@ struct Node::Impl {
   bool finish();
 
   const NodeFile config;
-  const std::function<void(const NodeState&, bool)> on_status;
+  const std::function<void(const NodeReport&, const pocd_msgs::msg::NodeHealth&)> on_status;
   BusWatch watch;  // outlives the participant
   const std::shared_ptr<Participant> participant;
   PocdPipeline pipeline;  // worker only
@@ -369,11 +369,11 @@ void Node::Impl::send_status(const std::string& word) {
   }
   map.send_manifest(work.objects, word == "stopped" && map.waiting() == 0,
                     work.kept.value_or(MemoryStatus{}));
-  const NodeState state = judge(input, work, word);
-  failing = state.verdict.level >= 2;
-  status->send(input, work, queue.size(), queue.dropped(), state, clock.now_ns());
+  NodeReport report{input, work, queue.size(), queue.dropped(), judge(input, work, word), ending};
+  failing = report.state.verdict.level >= 2;
+  const pocd_msgs::msg::NodeHealth health = status->send(report, clock.now_ns());
   graph->update();
-  if (on_status) on_status(state, ending);
+  if (on_status) on_status(report, health);
 }
 
 void Node::Impl::send_outputs(bool last) {

@@ -16,9 +16,8 @@ struct NodeOptions {
   NodeFile config;
   std::uint64_t epoch = 0;   ///< names this run in every identifier; never 0, never used twice
   std::string latency_file;  ///< CSV of the time that each frame took; empty: none
-  /// Called with each status, about once a second, by the thread of run(); `ending`: it was asked
-  /// to stop. May be empty.
-  std::function<void(const NodeState&, bool ending)> on_status;
+  /// Called about once a second by the thread of run(), with what was sent as health. May be empty.
+  std::function<void(const NodeReport&, const pocd_msgs::msg::NodeHealth&)> on_status;
 };
 
 /// Owns participant and threads: intake, worker, and one each that writes objects and that draws.

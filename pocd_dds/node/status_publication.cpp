@@ -6,6 +6,7 @@
 #include <map>
 
 #include "pocd_dds/bridge/object_messages.hpp"
+#include "pocd_dds/node/figures.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -34,33 +35,6 @@ void add(diagnostic_msgs::msg::DiagnosticStatus& status, const std::string& key,
   entry.key(key);
   entry.value(value);
   status.values().push_back(entry);
-}
-
-void add_memory(diagnostic_msgs::msg::DiagnosticStatus& status, const MapMemoryStatus& memory) {
-  add(status, "map memory [bytes]", std::to_string(memory.memory_bytes));
-  add(status, "map blocks in memory", std::to_string(memory.blocks_in_memory));
-  if (!memory.limited) return;
-  add(status, "map memory budget [bytes]", std::to_string(memory.budget_bytes));
-  add(status, "map blocks on disk", std::to_string(memory.blocks_on_disk));
-  add(status, "map disk [bytes]", std::to_string(memory.disk_bytes));
-  add(status, "map regions evicted", std::to_string(memory.evictions));
-  add(status, "map regions brought back", std::to_string(memory.returns));
-  add(status, "map regions the disk did not take", std::to_string(memory.write_failures));
-  add(status, "map blocks lost", std::to_string(memory.blocks_lost));
-  add(status, "frames over the map memory budget", std::to_string(memory.frames_over_budget));
-}
-
-void add_kept(diagnostic_msgs::msg::DiagnosticStatus& status, const MemoryStatus& kept) {
-  add(status, "memory steps written", std::to_string(kept.steps));
-  add(status, "memory steps not written", std::to_string(kept.failures));
-  add(status, "memory holds map version", std::to_string(kept.stored_version));
-  add(status, "memory holds events to", std::to_string(kept.stored_event));
-  add(status, "memory file [bytes]", std::to_string(kept.file_bytes));
-  add(status, "memory written [bytes]", std::to_string(kept.written_bytes));
-  add(status, "memory last step [ms]", std::to_string(kept.write_ms));
-  add(status, "memory CPU of copying [ms]", std::to_string(kept.gather_cpu_ms));
-  add(status, "memory CPU of writing [ms]", std::to_string(kept.write_cpu_ms));
-  if (!kept.problem.empty()) add(status, "memory problem", kept.problem);
 }
 
 std::string fixed(double value) {
@@ -102,8 +76,10 @@ StatusPublication::StatusPublication(const std::shared_ptr<Participant>& partici
       participant, topics::kDiagnostics);
 }
 
-void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work, std::size_t queued,
-                             std::uint64_t queue_dropped, const NodeState& state, StampNs now_ns) {
+pocd_msgs::msg::NodeHealth StatusPublication::send(const NodeReport& report, StampNs now_ns) {
+  const IntakeStatus& intake = report.intake;
+  const WorkStatus& work = report.work;
+  const NodeState& state = report.state;
   pocd_msgs::msg::NodeHealth health;
   health.node(node_key(epoch_));
   health.stamp(to_time(wall_clock_ns()));
@@ -114,9 +90,12 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   health.message(state.verdict.level >= kError ? state.verdict.why : state.word);
   health.ready(state.ready);
   health.still_s(state.still_s);
+  const FrameSums frames = frame_sums(report);
+  health.frames_received(frames.received);
   health.frames_processed(work.processed);
   health.frames_refused(work.refused);
-  health.queue_length(static_cast<std::uint32_t>(queued));
+  health.frames_dropped(frames.dropped);
+  health.queue_length(static_cast<std::uint32_t>(report.queued));
   health.processing_ms(work.processing_ms);
   health.objects(static_cast<std::uint32_t>(work.objects));
   health.map_version(work.map.version);
@@ -125,12 +104,7 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
   diagnostics.header().stamp(to_time(now_ns));
   auto node =
       status_of(health.level(), name_, state.verdict.why.empty() ? state.word : state.verdict.why);
-  // Sums only grow: alarms look at how fast.
-  std::uint64_t received = intake.departed_frames;
-  std::uint64_t dropped = queue_dropped + intake.departed_dropped;
   for (const RobotStatus& robot : intake.robots) {
-    received += robot.frames;
-    dropped += robot.dropped;
     pocd_msgs::msg::RobotHealth entry;
     entry.name(robot.name);
     entry.frames(robot.frames);
@@ -160,8 +134,6 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     health.departures().push_back(entry);
   }
   add_departed(intake, name_, diagnostics);
-  health.frames_received(received);
-  health.frames_dropped(dropped);
   for (const ProblemCounter::Entry& entry : intake.problems) {
     pocd_msgs::msg::InputProblem problem;
     problem.topic(entry.topic);
@@ -170,48 +142,27 @@ void StatusPublication::send(const IntakeStatus& intake, const WorkStatus& work,
     health.problems().push_back(problem);
     add(node, entry.topic + ": " + entry.reason, std::to_string(entry.count));
   }
-  add(node, "ready", state.ready ? "yes" : "no");
-  add(node, "longest time without a turn of a thread [s]", fixed(state.still_s));
-  add(node, "samples not written", std::to_string(work.write_failures));
-  add(node, "frames received", std::to_string(received));
-  add(node, "frames processed", std::to_string(work.processed));
-  add(node, "frames refused", std::to_string(work.refused));
-  add(node, "frames dropped", std::to_string(dropped));
-  add(node, "frames in queue", std::to_string(queued));
-  add_memory(node, work.memory);
-  if (work.kept) add_kept(node, *work.kept);
-  add(node, "processing [ms per frame]", std::to_string(work.processing_ms));
-  add(node, "longest from last image to map delta [ms]", std::to_string(work.latency_ms));
-  add(node, "CPU of the pipeline [ms]", std::to_string(work.pipeline_cpu_ms));
-  add(node, "CPU of publishing [ms]", std::to_string(work.publishing_cpu_ms));
-  add(node, "CPU of the intake [ms]", std::to_string(work.intake_cpu_ms));
-  add(node, "CPU of taking images, within the intake [ms]", std::to_string(work.take_cpu_ms));
-  add(node, "CPU of the process [ms]", std::to_string(work.process_cpu_ms));
-  add(node, "objects", std::to_string(work.objects));
-  add(node, "map version", std::to_string(work.map.version));
-  add(node, "map tiles", std::to_string(work.map.tiles));
-  add(node, "map area [m2]", fixed(work.map.area_m2));
+  for (const Figure& figure : figures_of(report)) add(node, figure.key, figure.text);
+  if (work.kept && !work.kept->problem.empty()) add(node, "memory problem", work.kept->problem);
   add(node, "map bytes per m2",
       fixed(work.map.area_m2 > 0 ? static_cast<double>(work.map.bytes) / work.map.area_m2 : 0.0));
   const std::uint64_t map_bytes = work.map.step_bytes + work.map.snapshot_bytes;
   const auto now = std::chrono::steady_clock::now();
   const double elapsed_s = std::chrono::duration<double>(now - sent_).count();
   add(node, "map bytes per second", fixed(static_cast<double>(map_bytes - map_bytes_) / elapsed_s));
-  add(node, "map bytes published", std::to_string(map_bytes));
-  add(node, "map bytes in snapshots", std::to_string(work.map.snapshot_bytes));
-  add(node, "map messages waiting", std::to_string(work.map.waiting));
   map_bytes_ = map_bytes;
   sent_ = now;
   if (!work.last_warning.empty()) add(node, "last warning", work.last_warning);
   diagnostics.status().insert(diagnostics.status().begin(), node);
   health_.write(health);
   if (ros_health_) ros_health_->write(health);
-  if (!diagnostics_) return;
+  if (!diagnostics_) return health;
   // Health keeps its own rhythm of about a second, so the first one that is not much too early.
   const double since_s = std::chrono::duration<double>(now - diagnostics_sent_).count();
-  if (since_s < diagnostics_period_s_ - 0.5 && state.word == "running") return;
+  if (since_s < diagnostics_period_s_ - 0.5 && state.word == "running") return health;
   diagnostics_sent_ = now;
   diagnostics_->write(diagnostics);
+  return health;
 }
 
 }  // namespace pocd::dds

@@ -40,6 +40,7 @@ std::uint64_t now_ns() {
 /// The file, when no recording is lost by it. What is replaced goes as a whole: of a longer split
 /// recording no file is left beside those of the new one.
 const std::filesystem::path& checked(const RecorderOptions& options) {
+  if (options.split.keep_bytes > 0 && !options.overwrite) return options.output;  // it goes on
   for (const std::filesystem::path& file :
        recording::SplitWriter::existing(options.output, options.split)) {
     if (!options.overwrite) {

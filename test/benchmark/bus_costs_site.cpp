@@ -146,7 +146,7 @@ void SitePublisher::send_status(int robots) {
   work.map = map_.traffic();
   work.objects = objects_.count();
   map_.send_manifest(work.objects, false);
-  status_.send(input, work, 0, 0, dds::NodeState{}, wall_ns());
+  status_.send({input, work, 0, 0, dds::NodeState{}, false}, wall_ns());
 }
 
 void SitePublisher::work(const std::atomic<bool>& stopping, const DriveLoad& load, int robots) {

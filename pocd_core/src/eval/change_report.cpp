@@ -14,12 +14,16 @@ std::string place(const Eigen::Vector3d& p) {
   return text.data();
 }
 
+}  // namespace
+
 std::string describe(const ReportedEvent& event) {
   std::string text = std::string(to_string(event.kind)) + " " + event.class_name + " #" +
                      std::to_string(event.object) + " ";
   if (event.previous_W) text += place(*event.previous_W) + " -> ";
   return text + place(event.position_W);
 }
+
+namespace {
 
 /// Events that no truth has claimed yet.
 class Unclaimed {
@@ -79,22 +83,6 @@ class Unclaimed {
   double radius_m_;
 };
 
-/// What the events say in the end: without an ADDED or REMOVED that a later MOVED takes back.
-std::vector<ReportedEvent> settled(const std::vector<ReportedEvent>& events) {
-  std::vector<ReportedEvent> kept;
-  for (const ReportedEvent& event : events) {
-    const auto taken_back = [&](const ReportedEvent& earlier) {
-      const bool same_thing = event.absorbed && earlier.object == *event.absorbed;
-      return (earlier.kind == EventKind::kAdded && same_thing) ||
-             (earlier.kind == EventKind::kRemoved && event.kind == EventKind::kMoved &&
-              earlier.object == event.object);
-    };
-    kept.erase(std::remove_if(kept.begin(), kept.end(), taken_back), kept.end());
-    kept.push_back(event);
-  }
-  return kept;
-}
-
 struct Truth {
   std::string visit;
   TruthChange change;
@@ -127,10 +115,25 @@ std::string describe(const TruthChange& change) {
 
 }  // namespace
 
+std::vector<ReportedEvent> last_words(const std::vector<ReportedEvent>& events) {
+  std::vector<ReportedEvent> kept;
+  for (const ReportedEvent& event : events) {
+    const auto taken_back = [&](const ReportedEvent& earlier) {
+      const bool same_thing = event.absorbed && earlier.object == *event.absorbed;
+      return (earlier.kind == EventKind::kAdded && same_thing) ||
+             (earlier.kind == EventKind::kRemoved && event.kind == EventKind::kMoved &&
+              earlier.object == event.object);
+    };
+    kept.erase(std::remove_if(kept.begin(), kept.end(), taken_back), kept.end());
+    kept.push_back(event);
+  }
+  return kept;
+}
+
 ChangeReport compare_changes(const Scenario& scenario, const std::vector<ReportedEvent>& events,
                              double radius_m) {
   const std::vector<Truth> truths = truths_of(scenario);
-  const std::vector<ReportedEvent> last_word = settled(events);
+  const std::vector<ReportedEvent> last_word = last_words(events);
   Unclaimed unclaimed(last_word, radius_m);
   ChangeReport report;
   for (const Truth& truth : truths) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "bag_metadata.hpp"
+#include "pocd/common/check.hpp"
 
 namespace pocd::recording {
 
@@ -36,15 +37,54 @@ std::vector<std::filesystem::path> SplitWriter::existing(const std::filesystem::
 
 SplitWriter::SplitWriter(std::filesystem::path path, SplitOptions options)
     : path_(std::move(path)), options_(std::move(options)) {
+  POCD_CHECK(options_.keep_bytes == 0 || options_.splits());
+  if (options_.keep_bytes > 0) find_earlier();
   open_next();
+}
+
+void SplitWriter::find_earlier() {
+  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+  std::map<std::size_t, std::filesystem::path> earlier;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().stem().string(), stem = path_.stem().string() + "_";
+    if (entry.path().extension() != path_.extension() || name.rfind(stem, 0) != 0) continue;
+    const std::string digits = name.substr(stem.size());
+    // As numbered() writes it, and no more than it will ever come to.
+    if (digits.size() < 4 || digits.size() > 9 ||
+        digits.find_first_not_of("0123456789") != std::string::npos) {
+      continue;
+    }
+    earlier[std::stoul(digits)] = entry.path();
+  }
+  for (const auto& [number, file] : earlier) {
+    const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+    files_.push_back(file);
+    counts_.push_back({});
+    closed_.push_back(error ? 0 : bytes);
+    bytes_before_ += closed_.back();
+    next_number_ = number + 1;
+  }
+}
+
+void SplitWriter::trim() {
+  while (!closed_.empty() && bytes_written() > options_.keep_bytes) {
+    std::error_code error;
+    std::filesystem::remove(files_.front(), error);  // one that is gone already is as good
+    bytes_before_ -= closed_.front();
+    closed_.erase(closed_.begin());
+    files_.erase(files_.begin());
+    counts_.erase(counts_.begin());
+  }
 }
 
 void SplitWriter::open_next() {
   if (writer_) {
     writer_->close();
-    bytes_before_ += writer_->bytes_written();
+    closed_.push_back(writer_->bytes_written());
+    bytes_before_ += closed_.back();
   }
-  const std::filesystem::path file = options_.splits() ? numbered(path_, files_.size()) : path_;
+  const std::filesystem::path file = options_.splits() ? numbered(path_, next_number_++) : path_;
   writer_ = std::make_unique<McapWriter>(file, options_.mcap);
   files_.push_back(file);
   counts_.push_back({});
@@ -93,6 +133,7 @@ void SplitWriter::write(const MessageHeader& header, const std::uint8_t* data, s
   empty_ = false;
   writer_->write(header, data, size);
   count_message(header);
+  if (options_.keep_bytes > 0) trim();
 }
 
 void SplitWriter::count_message(const MessageHeader& header) {
@@ -106,7 +147,7 @@ void SplitWriter::count_message(const MessageHeader& header) {
 
 void SplitWriter::close() {
   writer_->close();
-  if (!options_.splits()) return;
+  if (!options_.splits() || options_.keep_bytes > 0) return;
   BagMetadata metadata;
   metadata.schemas = schemas_;
   metadata.channels = channels_;

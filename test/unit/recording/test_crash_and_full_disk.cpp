@@ -194,5 +194,61 @@ TEST(SplitWriter, EveryFileBeginsWithTheHead) {
   EXPECT_EQ(SplitWriter::existing(folder / "run.mcap", options), writer.files());
 }
 
+// The last hours of a robot, whatever happened to the recorder meanwhile.
+TEST(SplitWriter, ARingKeepsTheLatestAlsoOverRuns) {
+  const TemporaryFolder folder;
+  SplitOptions options;
+  options.mcap.chunk_bytes = 500;
+  options.mcap.compression = "";
+  options.most_bytes = 5'000;
+  options.keep_bytes = 30'000;
+  std::ofstream(folder / "run_notes.mcap") << "not of the ring";
+  std::ofstream(folder / "run_12.mcap") << "not of the ring";
+  const Bytes data(300, 1);
+  const auto held = [&] {
+    std::map<std::string, std::uintmax_t> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+      if (entry.path().stem().string().size() == 8) {
+        files[entry.path().filename().string()] = entry.file_size();
+      }
+    }
+    return files;
+  };
+  std::uint32_t sent = 0;
+  for (int run = 0; run < 3; ++run) {
+    SplitWriter writer(folder / "run.mcap", options);
+    const auto schema = writer.add_schema("a", "ros2msg", "uint8 a\n");
+    const auto a = writer.add_channel(schema, "/a", "cdr", {});
+    for (int i = 0; i < 200; ++i, ++sent) {
+      writer.write({a, sent, 1000 + sent, 0}, data.data(), 300);
+      std::uintmax_t bytes = 0;
+      for (const auto& [name, size] : held()) bytes += size;
+      ASSERT_LE(bytes, options.keep_bytes + options.most_bytes) << "message " << sent;
+    }
+    writer.close();
+    const auto files = held();
+    EXPECT_EQ(files.size(), writer.files().size());
+    EXPECT_GE(files.size(), 4u) << "it keeps what there is room for";
+    EXPECT_FALSE(std::filesystem::exists(folder / "metadata.yaml"));
+    // Without a gap, up to the newest, also over the ends of runs.
+    std::uint32_t next = 0;
+    std::uintmax_t bytes = 0;
+    for (const auto& [name, size] : files) {
+      bytes += size;
+      for (const Kept& kept : read_all(*open_recording(folder / name))) {
+        if (next != 0) {
+          ASSERT_EQ(kept.sequence, next) << name;
+        }
+        next = kept.sequence + 1;
+      }
+    }
+    EXPECT_EQ(next, sent + 0u);
+    EXPECT_EQ(bytes, writer.bytes_written());
+    EXPECT_LE(bytes, options.keep_bytes + 2'000) << "closed, with its summary";
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder / "run_notes.mcap"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "run_12.mcap"));
+}
+
 }  // namespace
 }  // namespace pocd::recording

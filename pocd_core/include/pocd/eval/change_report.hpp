@@ -24,6 +24,12 @@ struct ReportedEvent {
 /// Reads what EventsCsv wrote, in order. Throws InputError naming file, line and column.
 std::vector<ReportedEvent> read_events_csv(const std::filesystem::path& file);
 
+/// One line: "MOVED box #4 (1.00, 2.00) -> (1.50, 2.00)".
+std::string describe(const ReportedEvent& event);
+
+/// What the events say in the end: without an ADDED or REMOVED that a later MOVED takes back.
+std::vector<ReportedEvent> last_words(const std::vector<ReportedEvent>& events);
+
 struct ChangeRow {
   std::string visit, truth, reported;
   bool right = false;

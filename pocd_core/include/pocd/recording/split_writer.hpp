@@ -14,13 +14,17 @@ struct SplitOptions {
   McapWriterOptions mcap;
   std::uint64_t most_bytes = 0;        ///< a new file begins beyond this size; 0: never
   std::uint64_t most_duration_ns = 0;  ///< or beyond this span of log times; 0: never
+  /// A ring: the oldest files are removed when all together are larger, also those that an earlier
+  /// run has left, after whose last one it goes on; 0: all are kept. Needs one of the two above.
+  std::uint64_t keep_bytes = 0;
 
   bool splits() const { return most_bytes > 0 || most_duration_ns > 0; }
 };
 
 /// Writes to `path`, or when splitting to path_0000.mcap, path_0001.mcap ... Every file is
-/// complete: it has all schemas and channels, under the same numbers. Not thread-safe; errors as
-/// McapWriter.
+/// complete: it has all schemas and channels, under the same numbers. A ring holds at most
+/// `keep_bytes` in closed files and the present one, as long as that one is no larger itself. Not
+/// thread-safe; errors as McapWriter.
 class SplitWriter {
  public:
   using Write =
@@ -41,13 +45,15 @@ class SplitWriter {
   static std::vector<std::filesystem::path> existing(const std::filesystem::path& path,
                                                      const SplitOptions& options);
   void flush() { writer_->flush(); }
-  /// Of several files, also writes metadata.yaml beside them, with which rosbag2 opens the folder.
+  /// Of several files, also writes metadata.yaml beside them, with which rosbag2 opens the folder;
+  /// not of a ring, whose files may be of several runs.
   void close();
   /// After close(): false when there is a metadata.yaml of other files, which was left alone.
   bool listed() const { return listed_; }
 
-  /// Of all files so far.
+  /// Of all files that there are.
   std::uint64_t bytes_written() const { return bytes_before_ + writer_->bytes_written(); }
+  /// That there are; the last one is being written.
   const std::vector<std::filesystem::path>& files() const { return files_; }
 
  private:
@@ -55,6 +61,10 @@ class SplitWriter {
     std::uint64_t start_ns = 0, end_ns = 0, messages = 0;
   };
   void open_next();
+  /// Of a ring: what an earlier run has left.
+  void find_earlier();
+  /// Of a ring: removes the oldest files beyond its size.
+  void trim();
   void count_message(const MessageHeader& header);
 
   std::filesystem::path path_;
@@ -63,7 +73,9 @@ class SplitWriter {
   std::vector<ChannelRecord> channels_;
   std::unique_ptr<McapWriter> writer_;
   std::vector<std::filesystem::path> files_;
-  std::vector<FileCount> counts_;  // of each
+  std::vector<FileCount> counts_;      // of each
+  std::vector<std::uint64_t> closed_;  // bytes of each but the present one
+  std::size_t next_number_ = 0;
   std::map<std::uint16_t, std::uint64_t> messages_of_;
   bool listed_ = true;
   std::uint64_t bytes_before_ = 0;

@@ -1,0 +1,51 @@
+// What a run is expected to report, and whether it did: for tests of a whole site.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pocd/config/describe.hpp"
+#include "pocd/eval/change_report.hpp"
+
+namespace pocd {
+
+/// One report that has to come. Places are of the box, on the ground, map frame.
+struct ExpectedChange {
+  std::string kind = "ADDED";
+  std::string class_name;
+  double x_m = 0.0, y_m = 0.0;
+  double from_x_m = 0.0, from_y_m = 0.0;  ///< MOVED only
+  double within_m = 0.6;
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("kind", kind, Choices{{"ADDED", "MOVED", "REMOVED"}}, "What is reported.");
+    visit("class_name", class_name, "Of the object; empty: any.");
+    visit("x_m", x_m, Range{-100'000, 100'000}, "Where it is now, REMOVED: was [m].");
+    visit("y_m", y_m, Range{-100'000, 100'000}, "Where it is now, REMOVED: was [m].");
+    visit("from_x_m", from_x_m, Range{-100'000, 100'000}, "MOVED: where it was [m].");
+    visit("from_y_m", from_y_m, Range{-100'000, 100'000}, "MOVED: where it was [m].");
+    visit("within_m", within_m, Range{0.01, 100.0}, "How far the report may be from there [m].");
+  }
+};
+
+/// The file of pocd_expect.
+struct ExpectedChanges {
+  std::vector<ExpectedChange> changes;
+  std::string others = "added";
+
+  template <class Visitor>
+  void describe(Visitor& visit) {
+    visit("changes", changes, "What has to be reported, each by an event of its own.");
+    visit("others", others, Choices{{"any", "added", "none"}},
+          "What else may be reported: anything, only ADDED (what stood there from the start), or "
+          "nothing.");
+  }
+};
+
+/// Compares the last word of the events, without what a later MOVED takes back. One line for each
+/// expectation that no event fulfils and each event that may not be; empty: all is as expected.
+std::vector<std::string> disappointments(const ExpectedChanges& expected,
+                                         const std::vector<ReportedEvent>& events);
+
+}  // namespace pocd
