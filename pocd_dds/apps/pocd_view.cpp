@@ -1,28 +1,53 @@
-// Serves a page that shows the map, the objects and what changed, live.
+// Serves a page that shows the map, the objects and what changed: live, of a recording, of a
+// memory.
 #include <boost/asio/ip/address.hpp>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <thread>
 
 #include "apps/common.hpp"
+#include "view/feed.hpp"
+#include "view/recorded.hpp"
+#include "view/remembered.hpp"
 #include "view/server.hpp"
 
 namespace {
 
 struct Options {
+  std::vector<std::string> inputs;  // none: the bus
+  int past_mb = 256;
   pocd::view::FeedOptions feed;
   pocd::view::ServerOptions server;
 };
 
+namespace view = pocd::view;
+
+/// What is shown: recordings, a memory, or the bus.
+std::unique_ptr<view::Source> source_of(const Options& options, view::Board& board) {
+  if (options.inputs.empty()) return std::make_unique<view::Feed>(options.feed, board);
+  const std::filesystem::path first = options.inputs.front();
+  if (std::filesystem::exists(first / "memory.sqlite")) {
+    if (options.inputs.size() > 1)
+      throw pocd::InputError("one memory at a time: " + first.string());
+    return std::make_unique<view::Remembered>(first, board);
+  }
+  view::RecordedOptions recorded;
+  recorded.inputs.assign(options.inputs.begin(), options.inputs.end());
+  recorded.map_id = options.feed.map_id;
+  recorded.map_frame = options.feed.map_frame;
+  recorded.robots = options.feed.robots;
+  return std::make_unique<view::Recorded>(recorded, board);
+}
+
 int serve(const Options& options) {
-  namespace view = pocd::view;
   const view::StaticFiles files(view::StaticFiles::installed());
-  view::Board board;
-  view::Feed feed(options.feed, board);
+  view::Board board(static_cast<std::size_t>(options.past_mb) << 20);
+  const std::unique_ptr<view::Source> source = source_of(options, board);
   pocd::dds::BusOptions bus{options.feed.domain, options.feed.profiles_file, ""};
   bus.security_folder = options.feed.security_folder;
   view::Relay relay(bus);
-  const view::Server server(options.server, files, board, &feed, relay);
+  const view::Server server(options.server, files, board, source.get(), relay);
   const bool local = options.server.address == "127.0.0.1";
   const bool v6 = options.server.address.find(':') != std::string::npos;
   const std::string host = local ? "localhost"
@@ -46,11 +71,20 @@ int main(int argc, char** argv) {
       "Serves a page that shows map, objects and changes as they come, and the same to viewers "
       "that\n"
       "speak the Foxglove WebSocket protocol. Prints its address.\n"
-      "Example: pocd_view --port 8080\n"
+      "With recordings (MCAP, .db3) or the folder of a memory it needs no bus and no node.\n"
+      "Examples: pocd_view --port 8080\n"
+      "          pocd_view run.mcap\n"
+      "          pocd_view /var/lib/pocd\n"
       "Exit code: 0 ended by a signal, 1 it cannot listen or has no bus, 2 usage.",
       "pocd_view");
   Options options;
   app.set_version_flag("--version", POCD_VERSION);
+  app.add_option("input", options.inputs,
+                 "Recordings of one run, in order, or the folder of a memory; none: the bus");
+  app.add_option("--past-mb", options.past_mb,
+                 "Memory for surfaces that were replaced, for the map of another time [MB]")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
   app.add_option("--address", options.server.address, "Address to listen on, 0.0.0.0 for all")
       ->check([](const std::string& text) {
         boost::system::error_code error;

@@ -7,6 +7,7 @@
 
 #include "view/board.hpp"
 #include "view/robots.hpp"
+#include "view/source.hpp"
 
 namespace pocd::view {
 
@@ -20,18 +21,16 @@ struct FeedOptions {
 };
 
 /// Threads of its own, from construction on. Thread-safe.
-class Feed {
+class Feed : public Source {
  public:
   /// `board` must outlive it. Throws InputError when the bus cannot be used.
   Feed(const FeedOptions& options, Board& board);
-  ~Feed();
+  ~Feed() override;
   Feed(const Feed&) = delete;
   Feed& operator=(const Feed&) = delete;
 
-  /// What is known of an object's past, or nothing: JSON, {"type": "history", ...}.
-  std::optional<std::string> history(const std::string& uuid) const;
-  /// The objects as they were at a stamp [s]: JSON, {"type": "then", ...}.
-  std::string then(double stamp_s) const;
+  std::optional<std::string> history(const std::string& uuid) const override;
+  std::string then(double stamp_s) const override;
   /// For readers of single topics.
   std::shared_ptr<dds::Participant> participant() const;
 

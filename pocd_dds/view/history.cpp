@@ -26,8 +26,10 @@ void thin(std::deque<ObjectSample>& samples) {
 
 }  // namespace
 
-void History::state(const std::string& uuid, const WatchedObject& object, StampNs now_ns) {
+void History::state(const std::string& uuid, const WatchedObject& object, std::uint32_t run,
+                    StampNs now_ns) {
   Record& record = records_[uuid];
+  record.run = run;
   record.class_name = object.class_name;
   record.number = to_index(object.state.id);
   record.stationarity_class = object.state.stationarity_class;
@@ -43,11 +45,43 @@ void History::state(const std::string& uuid, const WatchedObject& object, StampN
   }
   samples.push_back(sample);
   if (samples.size() > kMostSamples) thin(samples);
+  forget_departed();
+}
+
+void History::forget_departed() {
   while (records_.size() > kMostObjects && !departed_.empty()) {
     const auto oldest = records_.find(departed_.front());
     if (oldest != records_.end() && oldest->second.gone_ns) records_.erase(oldest);
     departed_.pop_front();
   }
+}
+
+void History::logged(const std::string& uuid, const WatchedObject& object, std::uint32_t run,
+                     const ObjectSample& sample, bool gone) {
+  const auto [entry, is_new] = records_.try_emplace(uuid);
+  Record& record = entry->second;
+  if (is_new) {
+    record.class_name = object.class_name;
+    record.number = to_index(object.state.id);
+    record.run = run;
+    record.stationarity_class = object.state.stationarity_class;
+    record.first_ns = sample.stamp_ns;
+  }
+  record.first_ns = std::min(record.first_ns, sample.stamp_ns);
+  auto& samples = record.samples;
+  const auto after =
+      std::upper_bound(samples.begin(), samples.end(), sample.stamp_ns,
+                       [](StampNs stamp, const ObjectSample& s) { return stamp < s.stamp_ns; });
+  const bool newest = after == samples.end();
+  samples.insert(after, sample);
+  // Who is seen after it went has come back.
+  if (gone && newest && !record.gone_ns) {
+    record.gone_ns = sample.stamp_ns;
+    departed_.push_back(uuid);
+  }
+  if (!gone && newest) record.gone_ns.reset();
+  if (samples.size() > kMostSamples) thin(samples);
+  forget_departed();
 }
 
 void History::gone(const std::string& uuid, StampNs now_ns) {

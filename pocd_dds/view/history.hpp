@@ -31,6 +31,7 @@ class History {
   struct Record {
     std::string class_name;
     std::uint32_t number = 0;  ///< within its run
+    std::uint32_t run = 0;
     int stationarity_class = 0;
     StampNs first_ns = 0;  ///< it was first seen
     std::optional<StampNs> gone_ns;
@@ -38,7 +39,12 @@ class History {
   };
 
   /// `now_ns`: the newest stamp heard of; a state that says nothing new is not kept.
-  void state(const std::string& uuid, const WatchedObject& object, StampNs now_ns);
+  void state(const std::string& uuid, const WatchedObject& object, std::uint32_t run,
+             StampNs now_ns);
+  /// What a log says of before: an object as it was at `sample`'s stamp, or (`gone`) that it went
+  /// then. `object` is how it is named.
+  void logged(const std::string& uuid, const WatchedObject& object, std::uint32_t run,
+              const ObjectSample& sample, bool gone);
   void gone(const std::string& uuid, StampNs now_ns);
 
   const Record* find(const std::string& uuid) const;
@@ -47,6 +53,8 @@ class History {
   std::size_t size() const { return records_.size(); }
 
  private:
+  void forget_departed();
+
   std::map<std::string, Record> records_;
   std::deque<std::string> departed_;  // in the order of going
 };

@@ -74,6 +74,7 @@ Json event_json(const pocd_msgs::msg::ObjectEvent& message, std::uint64_t number
   Json json = {{"type", "event"},
                {"event", number},
                {"run", run},
+               {"epoch", hex(message.epoch())},
                {"seq", event.sequence},
                {"kind", to_string(event.kind)},
                {"id", hex(message.uuid())},
@@ -84,6 +85,9 @@ Json event_json(const pocd_msgs::msg::ObjectEvent& message, std::uint64_t number
                {"frame", event.frame_sequence},
                {"box", box_json(event.box)}};
   if (event.previous_box) json["previous"] = box_json(*event.previous_box);
+  if (event.last_there_ns != 0) json["last_there"] = seconds(event.last_there_ns);
+  if (event.first_gone_ns != 0) json["first_gone"] = seconds(event.first_gone_ns);
+  if (!event.by.empty()) json["by"] = event.by;
   if (event.absorbed) json["absorbed"] = to_index(*event.absorbed);
   if (event.kind == EventKind::kAdded) json["arrival"] = to_string(event.arrival);
   json["evidence"] = {{"rule", evidence.rule},
@@ -98,6 +102,17 @@ Json event_json(const pocd_msgs::msg::ObjectEvent& message, std::uint64_t number
                       {"before", belief_json(evidence.before)},
                       {"after", belief_json(evidence.after)}};
   return json;
+}
+
+Json robot_json(const RobotPose& pose) {
+  const Eigen::Vector3d& p = pose.position_W;
+  const Eigen::Quaterniond& q = pose.rotation;
+  return {{"type", "robot"},
+          {"name", pose.name},
+          {"stamp", seconds(pose.stamp_ns)},
+          {"position", {rounded(p.x()), rounded(p.y()), rounded(p.z())}},
+          {"rotation", {rounded(q.x()), rounded(q.y()), rounded(q.z()), rounded(q.w())}},
+          {"view", pose.view}};
 }
 
 Json health_json(const pocd_msgs::msg::NodeHealth& health, const std::string& condition) {

@@ -3,6 +3,7 @@
 // fields.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -16,6 +17,15 @@ namespace pocd::view {
 
 using Json = nlohmann::json;
 
+/// A robot's camera in the map.
+struct RobotPose {
+  std::string name;
+  StampNs stamp_ns = 0;  ///< of its image
+  Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  std::array<double, 4> view{};  ///< tangents of the view's sides: left, right, up, down
+};
+
 std::string hex(const std::array<std::uint8_t, 16>& uuid);
 std::string hex(std::uint64_t number);
 /// Text of peers may be no UTF-8; such bytes become U+FFFD.
@@ -28,6 +38,7 @@ Json belief_json(const Belief& belief);
 Json object_json(const WatchedObject& object, std::uint32_t run, const std::string& condition);
 Json event_json(const pocd_msgs::msg::ObjectEvent& message, std::uint64_t number,
                 std::uint32_t run);
+Json robot_json(const RobotPose& pose);
 Json health_json(const pocd_msgs::msg::NodeHealth& health, const std::string& condition);
 Json sample_json(const ObjectSample& sample);
 Json record_json(const std::string& uuid, const History::Record& record);

@@ -4,9 +4,14 @@
 #include <cmath>
 
 #include "pocd_dds/bridge/conversions.hpp"
+#include "pocd_dds/bridge/object_messages.hpp"
 
 namespace pocd::view {
 namespace {
+
+constexpr StampNs kAbsent_ns = 5000000000;  // a robot that has said nothing for longer
+constexpr std::size_t kMostTrail = 120;     // places
+constexpr double kTrailStep_m = 0.15;
 
 /// Stands where the other one stood: closer than half of the longer side, as seen from above.
 bool same_place(const OrientedBox& a, const OrientedBox& b) {
@@ -16,15 +21,22 @@ bool same_place(const OrientedBox& a, const OrientedBox& b) {
 
 }  // namespace
 
-std::uint32_t ObjectFeed::run_of_locked(std::uint64_t epoch) {
+std::uint32_t ObjectFeed::run_of_locked(std::uint64_t epoch, std::uint64_t lineage) {
   if (epoch == 0) return 0;
+  lineages_[epoch] = lineage != 0 ? lineage : epoch;
   const auto next = static_cast<std::uint32_t>(runs_.size() + 1);
-  return runs_.emplace(epoch, next).first->second;
+  return runs_.emplace(lineages_[epoch], next).first->second;
 }
 
-std::uint32_t ObjectFeed::run_of(std::uint64_t epoch) {
+void ObjectFeed::know_run(std::uint64_t epoch, std::uint64_t lineage) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return run_of_locked(epoch);
+  run_of_locked(epoch, lineage);
+}
+
+std::uint32_t ObjectFeed::run_of(std::uint64_t epoch) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto lineage = lineages_.find(epoch);
+  return lineage == lineages_.end() ? 0 : runs_.at(lineage->second);
 }
 
 void ObjectFeed::heard(StampNs stamp_ns) {
@@ -37,7 +49,7 @@ void ObjectFeed::object(const WatchedObject& object) {
   heard(object.state.first_seen_ns);
   heard(object.state.last_seen_ns);
   const std::string uuid = hex(object.uuid);
-  history_.state(uuid, object, *last_ns_);
+  history_.state(uuid, object, run_of_locked(object.epoch, object.lineage), *last_ns_);
   for (auto other = unknown_.begin(); other != unknown_.end();) {
     if (other->second.epoch == object.epoch ||
         !same_place(other->second.state.box, object.state.box)) {
@@ -48,7 +60,7 @@ void ObjectFeed::object(const WatchedObject& object) {
     other = unknown_.erase(other);
   }
   board_.put_notice("object/" + uuid,
-                    text_of(object_json(object, run_of_locked(object.epoch),
+                    text_of(object_json(object, run_of_locked(object.epoch, object.lineage),
                                         object.state.seen_in_run ? "present" : "unknown")));
 }
 
@@ -66,12 +78,13 @@ void ObjectFeed::gone(const WatchedObject& object, Gone why) {
   }
   unknown_[uuid] = object;
   if (unknown_.size() > History::kMostObjects) unknown_.erase(unknown_.begin());
-  board_.put_notice("object/" + uuid,
-                    text_of(object_json(object, run_of_locked(object.epoch), "unknown")));
+  board_.put_notice(
+      "object/" + uuid,
+      text_of(object_json(object, run_of_locked(object.epoch, object.lineage), "unknown")));
 }
 
 void ObjectFeed::say_gone(const WatchedObject& object, const std::string& why) {
-  Json json = object_json(object, run_of_locked(object.epoch), "gone");
+  Json json = object_json(object, run_of_locked(object.epoch, object.lineage), "gone");
   json["why"] = why;
   const std::string key = "object/" + hex(object.uuid);
   board_.put_notice(key, text_of(json));
@@ -81,16 +94,58 @@ void ObjectFeed::say_gone(const WatchedObject& object, const std::string& why) {
   departures_.pop_front();
 }
 
-void ObjectFeed::event(const pocd_msgs::msg::ObjectEvent& message) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+bool ObjectFeed::say_event(const pocd_msgs::msg::ObjectEvent& message) {
+  const EventName name{message.lineage() != 0 ? message.lineage() : message.epoch(), message.seq()};
+  if (!known_events_.insert(name).second) return false;
   heard(dds::to_stamp(message.header().stamp()));
   const std::uint64_t number = ++event_count_;
   const std::string key = "event/" + std::to_string(number);
-  board_.put_notice(key, text_of(event_json(message, number, run_of_locked(message.epoch()))));
-  events_.push_back(key);
-  if (events_.size() <= kMostEvents) return;
-  board_.forget_notice(events_.front());
+  board_.put_notice(
+      key, text_of(event_json(message, number, run_of_locked(message.epoch(), message.lineage()))));
+  events_.emplace_back(key, name);
+  if (events_.size() <= kMostEvents) return true;
+  board_.forget_notice(events_.front().first);
+  known_events_.erase(events_.front().second);
   events_.pop_front();
+  return true;
+}
+
+void ObjectFeed::event(const pocd_msgs::msg::ObjectEvent& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  say_event(message);
+}
+
+void ObjectFeed::logged(const pocd_msgs::msg::ObjectEvent& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!say_event(message) || message.local_id() == 0) return;
+  const ObjectEvent event = dds::event_from(message);
+  WatchedObject object;
+  object.class_name = message.class_name();
+  object.state.id = event.object;
+  object.state.stationarity_class = event.evidence.stationarity_class;
+  const bool gone = event.kind == EventKind::kRemoved || event.kind == EventKind::kOperator;
+  const std::uint32_t run = run_of_locked(message.epoch(), message.lineage());
+  history_.logged(hex(message.uuid()), object, run,
+                  {event.stamp_ns, event.box, event.evidence.after, 0}, gone);
+  if (!event.absorbed) return;
+  object.state.id = *event.absorbed;
+  history_.logged(hex(message.absorbed_uuid()), object, run,
+                  {event.stamp_ns, event.box, event.evidence.after, 0}, true);
+}
+
+void ObjectFeed::robot(const RobotPose& pose) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  heard(pose.stamp_ns);
+  auto& past = poses_[pose.name];
+  if (past.empty() || past.back().stamp_ns < pose.stamp_ns) past.push_back(pose);
+  if (past.size() > kMostPoses) {
+    std::deque<RobotPose> kept;
+    for (std::size_t i = 0; i < past.size(); ++i) {
+      if (i % 2 == 0 || i >= past.size() / 2) kept.push_back(past[i]);
+    }
+    past = std::move(kept);
+  }
+  board_.put_notice("robot/" + pose.name, text_of(robot_json(pose)));
 }
 
 std::optional<std::pair<double, double>> ObjectFeed::time_range() const {
@@ -111,19 +166,47 @@ std::optional<std::string> ObjectFeed::history(const std::string& uuid) const {
   return text_of(record_json(uuid, *record));
 }
 
-std::string ObjectFeed::then(StampNs stamp_ns) const {
+Json ObjectFeed::robots_then(StampNs stamp_ns) const {
+  Json robots = Json::array();
+  for (const auto& [name, past] : poses_) {
+    auto after = std::upper_bound(
+        past.begin(), past.end(), stamp_ns,
+        [](StampNs stamp, const RobotPose& pose) { return stamp < pose.stamp_ns; });
+    if (after == past.begin()) continue;
+    const RobotPose& pose = *std::prev(after);
+    if (stamp_ns - pose.stamp_ns > kAbsent_ns) continue;
+    Json json = robot_json(pose);
+    Json& trail = json["trail"] = Json::array();
+    Eigen::Vector3d last = pose.position_W;
+    while (after != past.begin() && trail.size() < kMostTrail) {
+      const RobotPose& one = *--after;
+      if ((one.position_W - last).norm() < kTrailStep_m) continue;
+      last = one.position_W;
+      trail.push_back({std::round(last.x() * 100) / 100, std::round(last.y() * 100) / 100});
+    }
+    robots.push_back(std::move(json));
+  }
+  return robots;
+}
+
+std::string ObjectFeed::then(StampNs stamp_ns, bool map) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   Json objects = Json::array();
   for (const auto& [uuid, sample] : history_.at(stamp_ns)) {
     const History::Record& record = *history_.find(uuid);
     Json json = sample_json(sample);
     json["id"] = uuid;
+    json["run"] = record.run;
     json["number"] = record.number;
     json["class"] = record.class_name;
     json["static"] = record.stationarity_class == 1;
     objects.push_back(std::move(json));
   }
-  return text_of({{"type", "then"}, {"stamp", seconds(stamp_ns)}, {"objects", objects}});
+  return text_of({{"type", "then"},
+                  {"stamp", seconds(stamp_ns)},
+                  {"map", map},
+                  {"objects", objects},
+                  {"robots", robots_then(stamp_ns)}});
 }
 
 }  // namespace pocd::view

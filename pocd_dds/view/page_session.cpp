@@ -46,21 +46,24 @@ std::string PageSession::received(const std::string& message, bool binary) {
     }
     // What is not wanted any more is forgotten by the page, too.
     const std::set<ChunkKey> kept(wanted.begin(), wanted.end());
-    for (auto read = reading_.tiles.begin(); read != reading_.tiles.end();) {
-      read = kept.count(read->first) > 0 ? std::next(read) : reading_.tiles.erase(read);
-    }
+    reading_.keep_tiles_of(kept);
     wanted_ = std::move(wanted);
     return "";
   }
   if (name == "history" && value.is_string()) {
     const std::string uuid = value.get<std::string>();
-    const auto history = feed_ != nullptr ? feed_->history(uuid) : std::nullopt;
+    const auto history = source_ != nullptr ? source_->history(uuid) : std::nullopt;
     answer(
         history.value_or(text_of({{"type", "history"}, {"id", uuid}, {"samples", Json::array()}})));
     return "";
   }
+  if (name == "at" && value.is_null()) {
+    board_.show_at(reading_, std::nullopt);
+    return "";
+  }
   if (name == "at" && value.is_number()) {
-    if (feed_ != nullptr) answer(feed_->then(value.get<double>()));
+    board_.show_at(reading_, stamp_from(value.get<double>()));
+    if (source_ != nullptr) answer(source_->then(value.get<double>()));
     return "";
   }
   return kNoMessage;

@@ -4,7 +4,8 @@
 #include <deque>
 #include <vector>
 
-#include "view/feed.hpp"
+#include "view/board.hpp"
+#include "view/source.hpp"
 #include "view/web_session.hpp"
 
 namespace pocd::view {
@@ -13,7 +14,8 @@ namespace pocd::view {
 /// {"ack": 7}, when it has used it, and no more than kMostUnderWay are under way. So a page that is
 /// slow, or in the background, gets the newest state at its own pace. It may also send {"want":
 /// [[x, y, z], ...]}, the chunks that it wants finely, nearest first; {"history": uuid}; {"at":
-/// stamp}.
+/// stamp}: from then on it gets the map as it was at that stamp, and an answer with the objects;
+/// {"at": null}: of now again.
 class PageSession : public WebSession {
  public:
   static constexpr const char* kSubprotocol = "pocd.view.v1";
@@ -22,8 +24,8 @@ class PageSession : public WebSession {
   static constexpr std::size_t kMostWanted = 4096;   ///< chunks
   static constexpr std::size_t kMostAnswers = 16;    ///< not sent yet; the oldest make room
 
-  PageSession(boost::beast::tcp_stream&& stream, const Board& board, const Feed* feed)
-      : WebSession(std::move(stream)), board_(board), feed_(feed) {}
+  PageSession(boost::beast::tcp_stream&& stream, const Board& board, const Source* source)
+      : WebSession(std::move(stream)), board_(board), source_(source) {}
 
  protected:
   std::string received(const std::string& message, bool binary) override;
@@ -33,7 +35,7 @@ class PageSession : public WebSession {
   void answer(const std::string& json);
 
   const Board& board_;
-  const Feed* feed_;
+  const Source* source_;
   Reading reading_;
   std::vector<ChunkKey> wanted_;
   std::deque<Piece> answers_;

@@ -23,7 +23,42 @@ struct RobotTopics {
   std::string camera_info = dds::topics::kCameraInfo.name;
 };
 
-/// Reads poses and intrinsics only, no images. Not thread-safe.
+/// From messages, wherever they come from, to poses of cameras. Poses and intrinsics only, no
+/// images. Not thread-safe.
+class RobotPoses {
+ public:
+  static constexpr std::size_t kMostRobots = 200;
+
+  RobotPoses();
+
+  /// False: there are more robots than are followed.
+  bool know(const std::string& name);
+  void forget(const std::string& name) { robots_.erase(name); }
+  void transforms(const tf2_msgs::msg::TFMessage& message, bool is_static,
+                  const std::string& topic);
+  /// Of robots that are known.
+  void odometry(const std::string& name, const nav_msgs::msg::Odometry& message,
+                const std::string& topic);
+  void camera_info(const std::string& name, const sensor_msgs::msg::CameraInfo& message,
+                   const std::string& topic);
+  /// Of each robot whose camera has moved since the last call. `frame` is the map's.
+  std::vector<RobotPose> take(const std::string& frame);
+  dds::ProblemCounter& problems() { return problems_; }
+
+ private:
+  struct Robot {
+    explicit Robot(const TransformTree& shared);
+    TransformTree tree;
+    std::string camera_frame;
+    CameraModel camera;
+    StampNs image_ns = 0, shown_ns = 0;
+  };
+  TransformTree shared_;
+  std::map<std::string, std::unique_ptr<Robot>> robots_;
+  dds::ProblemCounter problems_;
+};
+
+/// Reads the bus. Not thread-safe.
 class Robots {
  public:
   /// `wakeup` must outlive it.
@@ -31,32 +66,24 @@ class Robots {
 
   /// Listens to these and no others.
   void follow(const std::set<std::string>& names);
-  /// Of each robot whose camera has moved since the last call: pose and intrinsics, by name.
-  /// `frame` is the map's.
-  std::map<std::string, Json> take(const std::string& frame);
-  const dds::ProblemCounter& problems() const { return problems_; }
+  /// See RobotPoses::take().
+  std::vector<RobotPose> take(const std::string& frame);
+  std::uint64_t problems() { return poses_.problems().total(); }
 
  private:
-  struct Robot {
-    Robot(const std::shared_ptr<dds::Participant>& participant, const RobotTopics& topics,
-          const std::string& name, const TransformTree& shared, dds::Wakeup& wakeup);
-    TransformTree tree;
+  struct Readers {
+    Readers(const std::shared_ptr<dds::Participant>& participant, const RobotTopics& topics,
+            const std::string& name, dds::Wakeup& wakeup);
     dds::Reader<nav_msgs::msg::OdometryPubSubType> odometry;
     dds::Reader<sensor_msgs::msg::CameraInfoPubSubType> camera_info;
-    std::string camera_frame;
-    CameraModel camera;
-    StampNs image_ns = 0, shown_ns = 0;
   };
-  void drain_transforms();
-  void drain(Robot& robot);
 
   std::shared_ptr<dds::Participant> participant_;
   RobotTopics topics_;
   dds::Wakeup& wakeup_;
-  TransformTree shared_;
+  RobotPoses poses_;
   dds::Reader<tf2_msgs::msg::TFMessagePubSubType> tf_, tf_static_;
-  std::map<std::string, std::unique_ptr<Robot>> robots_;
-  dds::ProblemCounter problems_;
+  std::map<std::string, std::unique_ptr<Readers>> robots_;
 };
 
 }  // namespace pocd::view

@@ -36,11 +36,11 @@ constexpr std::size_t kConnectionsBesides = 128;  // that are no WebSocket clien
 struct Server::Impl {
   class Connection;
 
-  Impl(const ServerOptions& given, const StaticFiles& page, Board& b, const Feed* f, Relay& r)
+  Impl(const ServerOptions& given, const StaticFiles& page, Board& b, const Source* s, Relay& r)
       : options(given),
         files(page),
         board(b),
-        feed(f),
+        source(s),
         relay(r),
         acceptor(context),
         timer(context),
@@ -68,7 +68,7 @@ struct Server::Impl {
   const ServerOptions options;
   const StaticFiles& files;
   Board& board;
-  const Feed* feed;
+  const Source* source;
   Relay& relay;
   asio::io_context context{1};
   tcp::acceptor acceptor;
@@ -233,7 +233,7 @@ bool Server::Impl::room() {
 std::shared_ptr<WebSession> Server::Impl::session_of(beast::tcp_stream&& stream,
                                                      const std::string& subprotocol) {
   if (subprotocol == PageSession::kSubprotocol) {
-    return std::make_shared<PageSession>(std::move(stream), board, feed);
+    return std::make_shared<PageSession>(std::move(stream), board, source);
   }
   return std::make_shared<FoxgloveSession>(std::move(stream), board, relay);
 }
@@ -262,8 +262,8 @@ void Server::Impl::pump_all() {
 }
 
 Server::Server(const ServerOptions& options, const StaticFiles& files, Board& board,
-               const Feed* feed, Relay& relay)
-    : impl_(std::make_unique<Impl>(options, files, board, feed, relay)) {}
+               const Source* source, Relay& relay)
+    : impl_(std::make_unique<Impl>(options, files, board, source, relay)) {}
 Server::~Server() = default;
 
 std::uint16_t Server::port() const { return impl_->acceptor.local_endpoint().port(); }

@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "view/feed.hpp"
+#include "view/board.hpp"
 #include "view/relay.hpp"
+#include "view/source.hpp"
 #include "view/static_files.hpp"
 
 namespace pocd::view {
@@ -27,9 +28,9 @@ struct ServerOptions {
 /// thread, from construction on.
 class Server {
  public:
-  /// All must outlive it; `feed` may be null (then nobody's past is known). Throws InputError when
-  /// the address or port cannot be had.
-  Server(const ServerOptions& options, const StaticFiles& files, Board& board, const Feed* feed,
+  /// All must outlive it; `source` may be null (then nobody's past is known). Throws InputError
+  /// when the address or port cannot be had.
+  Server(const ServerOptions& options, const StaticFiles& files, Board& board, const Source* source,
          Relay& relay);
   ~Server();
   Server(const Server&) = delete;

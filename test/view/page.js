@@ -105,12 +105,30 @@ main(async () => {
     const shown = window.pocd.shown();
     return shown.then && shown.count > 0 && shown.count < window.pocd.store.objects.size + 3;
   });
+  await holds("the map of then, which is smaller", (now) => window.pocd.then()?.map && document.querySelector("#pale").hidden && window.pocd.surface.tileCount < now && window.pocd.surface.tileCount > 0, counts.tiles);
+  await holds("the robots of then", () => window.pocd.robots.shown.size > 0 && [...window.pocd.robots.shown.values()].every((r) => r.stamp <= window.pocd.time.at));
   await shot("then");
+  const spoken = await page.evaluate(() => window.pocd.panel.then.length);
+  check(spoken === await page.evaluate(() => window.pocd.shown().count), "the list has the objects of then");
   await page.keyboard.press("b");
   await page.keyboard.press("Home");
-  await page.keyboard.press(" ");
+  await page.keyboard.press("n");
+  await holds("all tiles are back", (now) => window.pocd.surface.tileCount === now, counts.tiles);
+  await holds("the left half has the map of before", (id) => window.pocd.other()?.surface.tileCount > 0 && window.pocd.before()?.map && window.pocd.before().objects.some((object) => object.id === id), moved.id);
+  const places = await page.evaluate((id) => [window.pocd.before().objects.find((object) => object.id === id).box, window.pocd.store.find(id).box], moved.id);
+  check(Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) > 0.3, "before and after differ");
   await shot("before_and_after");
   await page.keyboard.press("b");
+
+  // Playing.
+  await page.evaluate(() => window.pocd.time.goTo(window.pocd.time.range[0] + 5));
+  await page.select("#time-speed", "5");
+  await page.keyboard.press(" ");
+  await holds("it plays", () => window.pocd.time.at > window.pocd.time.range[0] + 8);
+  await page.keyboard.press(" ");
+  const paused = await page.evaluate(() => [window.pocd.time.playing, window.pocd.time.at]);
+  check(!paused[0] && paused[1] !== null, "it pauses");
+  await page.keyboard.press("n");
 
   await page.keyboard.press("d");
   await shot("light");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Opens the page in a browser, and reads from pocd_view with other people's client of the Foxglove protocol.
-# usage: run.sh BIN_DIR WORK_DIR TEST.js. Screenshots of page.js are kept in WORK_DIR/pictures. Exit code 77:
+# usage: run.sh BIN_DIR WORK_DIR TEST.js. Screenshots are kept in WORK_DIR/pictures. Exit code 77:
 # skipped, there is no browser, no npm or no network.
 set -euo pipefail
 
@@ -12,7 +12,7 @@ skip() {
 }
 command -v npm >/dev/null && command -v node >/dev/null || skip "npm and node are not installed"
 chromium=$(command -v chromium || true)
-[[ -n $chromium || $script != page.js ]] || skip "Debian's chromium is not installed"
+[[ -n $chromium || $script == foxglove.js ]] || skip "Debian's chromium is not installed"
 mkdir -p "$work"
 cp "$here/package.json" "$here"/*.js "$work"
 cd "$work"

@@ -134,6 +134,24 @@ std::vector<std::pair<BlockKey, StampNs>> MemoryReader::last_looks() {
   });
 }
 
+std::vector<MapTile> MemoryReader::tiles(std::vector<std::string>& damage) {
+  return reading([&] {
+    std::vector<MapTile> tiles;
+    const auto damaged = [&](const std::string& what) { damage.push_back(what); };
+    read_rows(
+        impl_->database, kTiles,
+        [&](std::int64_t key, std::vector<std::uint8_t> data) {
+          try {
+            tiles.push_back(tile_row(key, std::move(data), "tile"));
+          } catch (const InputError& error) {
+            damaged(error.what());
+          }
+        },
+        damaged);
+    return tiles;
+  });
+}
+
 std::vector<LoggedRun> MemoryReader::runs() {
   return reading([&] {
     std::vector<LoggedRun> list;

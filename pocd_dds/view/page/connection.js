@@ -40,6 +40,8 @@ function* piecesOf(buffer) {
 export class Connection {
   /** `use(piece)` gets what comes; `said(state)` gets "open", "silent" or "closed" when that changes. */
   constructor(use, said) {
+    this.ended = false;
+    this.beats = true;  // a status comes every second: not of recordings and memories
     this.use = use;
     this.said = said;
     this.state = "closed";
@@ -47,7 +49,7 @@ export class Connection {
     this.heard = 0;
     this.bytes = 0;
     this.wishes = new Map();  // what is asked again after a new connection
-    setInterval(() => this.watch(), 500);
+    this.watching = setInterval(() => this.watch(), 500);
     document.addEventListener("visibilitychange", () => this.watch());
     this.connect();
   }
@@ -88,7 +90,7 @@ export class Connection {
       });
     };
     socket.onclose = () => {
-      if (socket !== this.socket) return;
+      if (socket !== this.socket || this.ended) return;
       this.tell("closed");
       setTimeout(() => this.connect(), this.retry);
       this.retry = Math.min(2 * this.retry, 5000);
@@ -96,9 +98,15 @@ export class Connection {
   }
 
   watch() {
-    if (this.socket.readyState !== WebSocket.OPEN || Date.now() - this.heard < kSilence) return;
+    if (!this.beats || this.socket.readyState !== WebSocket.OPEN || Date.now() - this.heard < kSilence) return;
     this.tell("silent");
     if (Date.now() - this.heard > 5 * kSilence) this.socket.close();
+  }
+
+  end() {
+    this.ended = true;
+    clearInterval(this.watching);
+    this.socket.close();
   }
 
   send(wish) {

@@ -7,6 +7,7 @@ const kCatchingUp = 2500;  // a copy that is a step behind for less is not stale
 export class Health {
   constructor() {
     this.link = "closed";
+    this.unknown = 0;  // objects that are drawn so
     this.clear();
     $("state").addEventListener("click", () => { $("alarm").hidden = !$("alarm").hidden; });
   }
@@ -41,6 +42,11 @@ export class Health {
     if (this.link === "silent") return ["bad", "stale", "pocd_view is silent; what you see is the last that came"];
     if (!this.status) return ["warn", "connecting", ""];
     const status = this.status;
+    if (status.played) {
+      const { kind, name, read, problem } = status.played;
+      if (problem) return ["warn", `${kind}, damaged`, ""];
+      return read < 1 ? ["warn", `reading ${Math.floor(100 * read)} %`, ""] : ["good", `${kind} ${name}`, ""];
+    }
     if (!status.publisher_seen) return ["warn", "no map yet", "no publisher of this map was heard of; is pocd_node running on this domain?"];
     if (this.behind !== null && performance.now() - this.behind < kCatchingUp) return ["good", "in step", ""];
     if (!status.in_step) return ["bad", "stale", status.stale_because];
@@ -71,9 +77,13 @@ export class Health {
         }
       }
     }
+    if (this.status?.played?.problem) alarms.push(`<b>${escaped(this.status.played.name)}</b> is damaged: ${escaped(this.status.played.problem)}.`);
     if (robots.length > 4) robots = [`<span class="chip good">${robots.length} robots</span>`];
-    if (this.status?.earlier_tiles > 0 || this.status?.unknown_objects > 0) {
-      alarms.push(`Since the restart nobody has looked at ${this.status.unknown_objects} objects and ${this.status.earlier_tiles} tiles of the map (striped).`);
+    const unknown = Math.max(this.status?.unknown_objects ?? 0, this.unknown);
+    const { earlier_tiles: tiles = 0, regions_not_looked_at: regions = 0 } = this.status ?? {};
+    if (!this.status?.played && (tiles > 0 || regions > 0 || unknown > 0)) {
+      const map = regions > 0 ? `${regions} region${regions === 1 ? "" : "s"}` : `${tiles} tile${tiles === 1 ? "" : "s"}`;
+      alarms.push(`Since the restart nobody has looked at ${unknown} object${unknown === 1 ? "" : "s"} and ${map} of the map (striped).`);
     }
     fill($("nodes"), nodes.join(""));
     fill($("robots"), robots.join(""));

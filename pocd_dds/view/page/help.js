@@ -8,7 +8,8 @@ export const keyTable = [
   { keys: ["b", "B"], shown: "B", action: "split", words: "before and after side by side" },
   { keys: ["d", "D"], shown: "D", action: "theme", words: "dark or light" },
   { keys: ["l", "L"], shown: "L", action: "link", words: "copy a link to this view" },
-  { keys: [" "], shown: "Space", action: "live", words: "back to now" },
+  { keys: [" "], shown: "Space", action: "play", words: "play from the shown time on, pause" },
+  { keys: ["n", "N", "End"], shown: "N, End", action: "live", words: "back to now, or to the end" },
   { keys: ["Escape"], shown: "Esc", action: "escape", words: "nothing selected" },
   { keys: ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"], shown: "arrows", words: "move over the map" },
   { keys: ["+", "=", "-"], shown: "+ -", words: "nearer, farther" },
@@ -21,6 +22,7 @@ export function helpHtml() {
   const keys = keyTable.map((row) => `<tr><td><kbd>${row.shown}</kbd></td><td>${row.words}</td></tr>`).join("");
   return `<h2>Keys</h2><table>${keys}</table>
     <p>Drag turns the view, drag with the right button or two fingers moves it, wheel or pinch goes nearer. A click on a box selects it.</p>
+    <p>On the time line a click or a drag shows another time, the wheel zooms; drag the triangle to say since when changes are shown.</p>
     <h2>Colours</h2><table>
     <tr><td>${swatch("added")}</td><td>added since the marker of the time line</td></tr>
     <tr><td>${swatch("moved")} ${swatch("moved", true)}</td><td>moved: where it is, and dashed where it was, with an arrow</td></tr>

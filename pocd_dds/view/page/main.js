@@ -17,9 +17,12 @@ import { metres, timeText } from "./words.js";
 const $ = (id) => document.getElementById(id);
 let theme = themes.dark;
 let selected = null, following = null, measuring = null, fitted = false, wantsFit = true;
-let then = null;      // objects of another time: {stamp, objects}
+let then = null;      // objects and robots of another time: {stamp, map, objects, robots}
 let before = null;    // those of the marker "since", for the left half
+let other = null;     // the map of then for the left half: {connection, surface}
 let drawn = false, cut = Infinity, restored = false;
+
+const times = { first: null, last: null };  // of the first picture with a map, and of the last surface [ms]
 
 const stage = new Stage($("canvas"));
 const store = new ObjectStore();
@@ -39,6 +42,7 @@ const time = new TimeLine(panel.events, timeChanged);
 function use(piece) {
   if (piece.kind !== "json") {
     surface.use(piece);
+    times.last = performance.now();
     stage.askSoon();
     return;
   }
@@ -49,12 +53,19 @@ function use(piece) {
       break;
     case "status":
       health.useStatus(json);
+      connection.beats = !json.played;
       surface.setRun(json.run, json.voxel);
       if (json.time) time.setRange(json.time);
-      $("empty").textContent = json.publisher_seen ? "The map is still empty." : "Waiting for a map on the bus ...";
+      time.setMapSince(json.map_since ?? null);
+      if ((json.played?.kind ?? null) !== time.played) time.setPlayed(json.played?.kind ?? null);
+      $("empty").textContent = json.played ? (json.played.read < 1 ? `Reading ${json.played.name} ...` : "It holds no map.") : json.publisher_seen ? "The map is still empty." : "Waiting for a map on the bus ...";
       break;
     case "health": health.useNode(json); break;
     case "robot": robots.use(json); break;
+    case "looks":
+      surface.useLooks(json);
+      stage.askSoon();
+      break;
     case "object":
       store.use(json, performance.now());
       if (json.id === selected) askHistory(json.id);
@@ -62,14 +73,39 @@ function use(piece) {
       break;
     case "event":
       panel.addEvent(json);
+      if (json.kind === "OPERATOR") document.querySelector(".kind.operator").hidden = false;
       time.dirty = true;
       break;
     case "history": panel.addHistory(json); break;
     case "then":
-      if (time.at !== null && Math.abs(json.stamp - time.at) < 1e-3) then = json;
-      if (Math.abs(json.stamp - time.sinceStamp()) < 1e-3) before = json;
+      if (time.at !== null) showThen(json);
       break;
   }
+  drawn = false;
+}
+
+/** What comes for the left half. */
+function useBefore(piece) {
+  if (!other) return;
+  if (piece.kind !== "json") {
+    other.surface.use(piece);
+    stage.askSoon();
+  } else if (piece.json.type === "reset") {
+    other.surface.clear();
+  } else if (piece.json.type === "status") {
+    other.surface.setRun(piece.json.run, piece.json.voxel);
+  } else if (piece.json.type === "then") {
+    before = piece.json;
+    drawn = false;
+  }
+}
+
+function showThen(json) {
+  then = json;
+  robots.show(json?.robots ?? null);
+  panel.then = json?.objects ?? null;
+  panel.dirty = true;
+  $("pale").hidden = !json || json.map;
   drawn = false;
 }
 
@@ -104,16 +140,41 @@ function inView(box) {
 
 let thenTimer = null;
 function timeChanged() {
-  if (time.at === null) then = null;
+  if (time.at === null && then) showThen(null);
   // While a marker is dragged the server is asked ten times a second at most.
   thenTimer ??= setTimeout(() => {
     thenTimer = null;
-    if (time.at !== null) connection.send({ at: time.at });
-    if (stage.split) connection.send({ at: time.sinceStamp() });
+    if (time.at !== timeChanged.asked) connection.wish("at", time.at);
+    timeChanged.asked = time.at;
+    if (other) askBefore();
   }, 100);
   panel.until = time.shown();
   panel.dirty = true;
   drawn = false;
+}
+
+function askBefore() {
+  const since = time.sinceStamp();
+  if (since === other.asked) return;
+  other.asked = since;
+  other.connection.wish("at", since);
+}
+
+function setSplit(on) {
+  stage.split = on;
+  before = null;
+  if (on) {
+    other = { surface: new Surface(stage.scene, (list) => other?.connection.wish("want", list)), asked: null };
+    other.surface.setTheme(theme);
+    other.surface.cutAbove(Number.isFinite(cut) ? cut : 1e6);
+    other.connection = new Connection(useBefore, () => {});
+    askBefore();
+  } else if (other) {
+    other.connection.end();
+    other.surface.end();
+    other = null;
+    surface.group.visible = true;
+  }
 }
 
 /** The last event of each object that has changed between the marker and the time that is shown. */
@@ -137,10 +198,18 @@ function drawObjects(now) {
   const live = store.list(now);
   const objects = then ? then.objects.map((object) => ({ ...object, condition: "present" })) : live;
   layers.now.draw(objects, changes, theme, selected);
-  if (stage.split) layers.before.draw((before?.objects ?? []).map((object) => ({ ...object, condition: "present" })), [], theme, selected);
-  surface.dim(then ? 1 : 0);
-  for (const object of live) surface.paint(object.run, object.number, object.condition === "unknown" ? null : colourOfScore(object.belief.v));
+  surface.dim(then && !then.map ? 1 : 0);
   for (const object of store.gone.values()) surface.paint(object.run, object.number, null);
+  if (then) for (const object of live) surface.paint(object.run, object.number, null);
+  for (const object of objects) surface.paint(object.run, object.number, object.condition === "unknown" ? null : colourOfScore(object.belief.v));
+  health.unknown = live.filter((object) => object.condition === "unknown").length;
+  if (other) {
+    const then_objects = (before?.objects ?? []).map((object) => ({ ...object, condition: "present" }));
+    layers.before.draw(then_objects, [], theme, selected);
+    other.surface.dim(before && !before.map ? 1 : 0);
+    for (const object of then_objects) other.surface.paint(object.run, object.number, colourOfScore(object.belief.v));
+    if (before) askBefore();
+  }
   $("split-left").textContent = `before: ${timeText(time.sinceStamp())}`;
   $("split-right").textContent = time.at === null ? "now" : timeText(time.at);
   drawn = store.gliding.size === 0;
@@ -161,7 +230,9 @@ stage.before.push((now) => {
   const followed = following && robots.find(following);
   if (followed && robots.moved) stage.follow(robots.moved.from, pose(followed));
   robots.moved = null;
-  if (surface.update(stage.camera.position, Math.max(60, 6 * stage.camera.position.distanceTo(stage.controls.target)))) stage.askSoon();
+  const reach = Math.max(60, 6 * stage.camera.position.distanceTo(stage.controls.target));
+  if (surface.update(stage.camera.position, reach)) stage.askSoon();
+  if (other?.surface.update(stage.camera.position, reach)) stage.askSoon();
   time.draw(theme);
   panel.update(time.range ? time.range[1] : 0);
   return false;
@@ -169,10 +240,15 @@ stage.before.push((now) => {
 stage.halves.push((part) => {
   layers.now.group.visible = part !== "left";
   layers.before.group.visible = part === "left";
-  robots.lines.mesh.visible = part !== "left" && robots.any && !then;
+  robots.lines.mesh.visible = part !== "left" && robots.any;
+  if (other) {
+    surface.group.visible = part !== "left";
+    other.surface.group.visible = part === "left";
+  }
 });
-const rightLabels = () => layers.now.labels.concat(then ? [] : robots.labels, tapeLabels());
+const rightLabels = () => layers.now.labels.concat(robots.labels, tapeLabels());
 stage.after.push(() => {
+  if (!times.first && times.last) times.first = performance.now();
   const placed = stage.split ? [{ labels: layers.before.labels, offset: 0 }, { labels: rightLabels(), offset: stage.partWidth }]
     : [{ labels: rightLabels(), offset: 0 }];
   labels.place(placed, selected);
@@ -181,6 +257,7 @@ stage.after.push(() => {
 // Several times a second: what depends on where the camera is, and the first picture.
 setInterval(() => {
   surface.chooseDetail(stage.camera.position, stage.controls.target);
+  other?.surface.chooseDetail(stage.camera.position, stage.controls.target);
   const bounds = surface.bounds();
   $("empty").hidden = Boolean(bounds) || store.objects.size > 0;
   health.show();
@@ -194,7 +271,7 @@ setInterval(() => {
   const height = share >= 1 ? Infinity : bounds.min.z + share * (top - bounds.min.z);
   if (height !== cut) {
     cut = height;
-    surface.cutAbove(Number.isFinite(cut) ? cut : 1e6);
+    for (const one of [surface, other?.surface]) one?.cutAbove(Number.isFinite(cut) ? cut : 1e6);
     $("cut-value").textContent = Number.isFinite(cut) ? `${cut.toFixed(1)} m` : "off";
     stage.ask();
   }
@@ -222,6 +299,7 @@ function setTheme(name) {
   document.documentElement.dataset.theme = name;
   stage.renderer.setClearColor(theme.ground, 1);
   surface.setTheme(theme);
+  other?.surface.setTheme(theme);
   time.dirty = true;
   drawn = false;
   robots.dirty = true;
@@ -260,7 +338,7 @@ const actions = {
     drawTape();
   },
   split() {
-    stage.split = !stage.split;
+    setSplit(!stage.split);
     press("tool-split", stage.split);
     $("split-line").hidden = !stage.split;
     timeChanged();
@@ -281,6 +359,7 @@ const actions = {
     if ($("help").open) $("help").close();
     else $("help").showModal();
   },
+  play() { time.toggle(); },
   live() { time.live(); },
   escape() {
     if (measuring) actions.measure();
@@ -322,7 +401,7 @@ $("canvas").addEventListener("pointerdown", (down) => { pressedAt = [down.client
 $("canvas").addEventListener("pointerup", (up) => {
   if (!pressedAt || Math.hypot(up.clientX - pressedAt[0], up.clientY - pressedAt[1]) > 6) return;
   const { raycaster, part } = stage.rayAt(up.clientX, up.clientY);
-  const point = surface.hit(raycaster);
+  const point = (part === "left" && other ? other.surface : surface).hit(raycaster);
   if (measuring) {
     if (!point) return;
     if (measuring.length === 2) measuring = [];
@@ -396,4 +475,5 @@ restoreLink();
 
 // For tests and the curious: what the page knows.
 window.pocd = { stage, store, surface, panel, time, health, robots, connection, select, actions,
+  times, then: () => then, before: () => before, other: () => other,
   shown: () => ({ then: Boolean(then), count: then ? then.objects.length : store.objects.size }) };

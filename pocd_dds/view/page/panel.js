@@ -16,6 +16,7 @@ export class Panel {
     this.dirty = true;
     this.since = -Infinity;
     this.until = Infinity;
+    this.then = null;   // objects of another time
     this.last = 0;
     for (const button of document.querySelectorAll(".kind")) {
       button.addEventListener("click", () => {
@@ -99,7 +100,7 @@ export class Panel {
     const all = [...this.events.values()].sort((a, b) => b.stamp - a.stamp || b.event - a.event);
     const matching = all.filter((event) => this.passes(event, latest));
     $("count-changes").textContent = matching.length;
-    $("count-objects").textContent = this.store.objects.size;
+    $("count-objects").textContent = this.then ? this.then.length : this.store.objects.size;
     if (!$("changes").hidden) {
       const rows = matching.slice(0, kMostRows).map((event) => `<li><button data-id="${escaped(event.id)}" data-event="${event.event}" class="${event.kind} ${event.id === this.selected ? "selected" : ""} ${event.stamp > this.until ? "later" : ""}">
         <span class="mark"></span><span>${escaped(eventTitle(event))}</span><span class="when">${escaped(timeText(event.stamp))}</span>
@@ -132,18 +133,20 @@ export class Panel {
 
   updateObjects() {
     const words = $("filter-object").value.toLowerCase().replace("#", "").split(/\s+/).filter(Boolean);
-    const objects = [...this.store.objects.values()]
+    const objects = (this.then ?? [...this.store.objects.values()])
       .filter((o) => words.every((word) => o.class.toLowerCase().includes(word) || String(o.number) === word))
       .sort((a, b) => a.number - b.number);
     const rows = objects.slice(0, kMostRows).map((o) => `<li><button data-id="${escaped(o.id)}" class="${o.id === this.selected ? "selected" : ""}">
       <span class="mark" style="background:${o.condition === "unknown" ? "var(--unknown)" : `hsl(${Math.round(165 * o.belief.v)} 60% 46%)`}"></span><span>${escaped(nameOf(o))}</span><span class="when">E[v] ${score(o.belief.v)}</span>
-      <span class="why">${o.condition === "unknown" ? "not looked at since the restart" : `at ${placeOf(o.box)}, last seen ${escaped(timeText(o.last_seen))}`}</span></button></li>`);
+      <span class="why">${o.condition === "unknown" ? "not looked at since the restart" : this.then ? `at ${placeOf(o.box)}` : `at ${placeOf(o.box)}, last seen ${escaped(timeText(o.last_seen))}`}</span></button></li>`);
     this.fill($("object-list"), rows, "No object.");
   }
 
   updateDetail() {
     const root = $("detail");
-    const object = this.selected && this.store.find(this.selected);
+    const past = this.selected && this.then?.find((one) => one.id === this.selected);
+    const known = this.selected && this.store.find(this.selected);
+    const object = past && known ? { ...known, ...past, condition: known.condition } : known;
     const events = this.selected ? this.eventsOf(this.selected) : [];
     root.hidden = !object && events.length === 0;
     if (root.hidden) return;

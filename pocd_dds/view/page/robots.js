@@ -21,6 +21,7 @@ export class Robots {
 
   clear() {
     this.robots = new Map();
+    this.then = null;  // those of another time
     this.trails = new Map();
     this.labels = [];
     this.dirty = true;
@@ -29,7 +30,7 @@ export class Robots {
 
   use(json) {
     const before = this.robots.get(json.name);
-    if (before && json.name === this.followed) this.moved ??= { from: before.position };
+    if (before && json.name === this.followed && !this.then) this.moved ??= { from: before.position };
     this.robots.set(json.name, json);
     const trail = this.trails.get(json.name) ?? [];
     const last = trail.at(-1);
@@ -39,11 +40,22 @@ export class Robots {
     this.dirty = true;
   }
 
-  find(name) { return this.robots.get(name); }
+  /** Robots as they were at another time, with the ways that they had come; null: as they are now. */
+  show(list) {
+    if (!list && !this.then) return;
+    const before = this.find(this.followed);
+    this.then = list && new Map(list.map((robot) => [robot.name, robot]));
+    const after = this.find(this.followed);
+    if (before && after) this.moved ??= { from: before.position };
+    this.dirty = true;
+  }
+
+  get shown() { return this.then ?? this.robots; }
+  find(name) { return this.shown.get(name); }
 
   /** The one after `name`, by name; null after the last. */
   next(name) {
-    const names = [...this.robots.keys()].sort();
+    const names = [...this.shown.keys()].sort();
     return names[name === null ? 0 : names.indexOf(name) + 1] ?? null;
   }
 
@@ -55,7 +67,7 @@ export class Robots {
     const rgb = rgbOf(theme.robot);
     this.lines.begin();
     this.labels = [];
-    for (const robot of this.robots.values()) {
+    for (const robot of this.shown.values()) {
       const at = robot.position, [left, right, up, down] = robot.view;
       const corners = [[-left, -up], [right, -up], [right, down], [-left, down]].map(([x, y]) => {
         const ray = turned(robot.rotation, [kCone * x, kCone * y, kCone]);
@@ -67,7 +79,7 @@ export class Robots {
         this.lines.add(corner, corners[(i + 1) % 4], rgb, width, 0.95);
       });
       this.lines.add([at[0], at[1], 0], at, rgb, 2.5);
-      const trail = this.trails.get(robot.name);
+      const trail = this.then ? [[at[0], at[1], 0.04], ...robot.trail.map(([x, y]) => [x, y, 0.04])].reverse() : this.trails.get(robot.name);
       for (let i = 1; i < trail.length; ++i) this.lines.add(trail[i - 1], trail[i], rgb, 1.6, 0.15 + 0.5 * i / trail.length);
       this.labels.push({ at: [at[0], at[1], at[2] + 0.2], text: robot.name, kind: "robot", rank: 1 });
     }

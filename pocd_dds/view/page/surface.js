@@ -29,7 +29,7 @@ void main() {
 const fragmentShader = `
 precision highp float;
 uniform vec3 wall, ground, floorColour, eye;
-uniform float cut, dim, reach;
+uniform float cut, dim, reach, unlooked;
 varying vec3 world, facing;
 varying vec4 owner;
 varying float earlier;
@@ -42,7 +42,7 @@ void main() {
   float light = 0.5 + 0.32 * sun + 0.26 * head;
   float flat_ = smoothstep(0.75, 0.95, n.z);
   vec3 base = mix(mix(wall, floorColour, flat_), owner.rgb, owner.a * (1.0 - dim));
-  if (earlier > 0.5) {
+  if (earlier + unlooked > 0.5) {
     float stripe = step(0.5, fract((world.x + world.y + world.z) * 3.0));
     base = mix(mix(base, ground, 0.55), ground, 0.35 * stripe);
   }
@@ -74,7 +74,10 @@ export class Surface {
       palette: { value: this.palette }, wall: { value: new THREE.Color() }, floorColour: { value: new THREE.Color() },
       ground: { value: new THREE.Color() }, eye: { value: new THREE.Vector3() }, cut: { value: 1e6 }, dim: { value: 0 }, reach: { value: 400 },
     };
-    this.material = new THREE.RawShaderMaterial({ uniforms: this.uniforms, vertexShader, fragmentShader, side: THREE.FrontSide });
+    const material = (unlooked) => new THREE.RawShaderMaterial({ uniforms: { ...this.uniforms, unlooked: { value: unlooked } }, vertexShader, fragmentShader, side: THREE.FrontSide });
+    this.material = material(0);
+    this.unlooked = material(1);  // of chunks that nobody has looked at since the restart
+    this.sectors = new Map();     // "x/y/z" -> keys of such chunks
     this.lastWish = "";
     this.tileCount = 0;
     this.triangles = 0;
@@ -116,7 +119,33 @@ export class Surface {
     for (const chunk of this.chunks.values()) chunk.dirty = true;
   }
 
+  /** Chunks [x, y, z, last look] of a sector that nobody has looked at since the node was started. */
+  useLooks({ sector, not_looked_at: list }) {
+    const keys = new Map(list.map(([x, y, z, stamp]) => [keyOf(x, y, z), stamp]));
+    const changed = new Set([...keys.keys(), ...(this.sectors.get(sector)?.keys() ?? [])]);
+    this.sectors.set(sector, keys);
+    for (const key of changed) if (this.chunks.has(key)) this.dress(this.chunks.get(key));
+  }
+
+  /** Stamp of the last look at a chunk that nobody has looked at since the restart; undefined for others. */
+  lastLook(chunk) {
+    const sector = [chunk.x, chunk.y, chunk.z].map((v) => v >> 3).join("/");
+    return this.sectors.get(sector)?.get(keyOf(chunk.x, chunk.y, chunk.z));
+  }
+
+  dress(chunk) {
+    const material = this.lastLook(chunk) === undefined ? this.material : this.unlooked;
+    for (const mesh of [chunk.coarse, chunk.fine]) if (mesh) mesh.material = material;
+  }
+
+  end() {
+    this.clear();
+    this.group.parent.remove(this.group);
+    this.palette.dispose();
+  }
+
   clear() {
+    this.sectors.clear();
     for (const chunk of this.chunks.values()) {
       this.show(chunk, "coarse", null);
       this.show(chunk, "fine", null);
@@ -202,6 +231,7 @@ export class Surface {
       chunk[level] = new THREE.Mesh(geometry, this.material);
       this.triangles += geometry.index.count / 3;
       this.group.add(chunk[level]);
+      this.dress(chunk);
       this.place(chunk);
     }
     this.choose(chunk);

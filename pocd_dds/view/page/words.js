@@ -31,6 +31,16 @@ const rules = {
   aligned_elsewhere: "its surface fits at another place",
   part_removed: "a part of it is gone",
   grew: "more of it was seen",
+  part_seen_through: "a part of it was seen to be gone",
+  found: "it was found where nobody had looked before",
+  never_confirmed: "it was not seen often enough to be sure of it",
+  conflict: "something that is not it was seen in its place",
+  forget_object: "it is to be forgotten",
+  confirm_removal: "a person has seen that it is gone",
+  forget_region: "everything in a region is to be forgotten",
+  ignore_region: "a region is not to be looked at",
+  heed_region: "a region is to be looked at again",
+  reset: "everything is to be forgotten",
 };
 
 export function ruleText(rule) {
@@ -47,6 +57,7 @@ export function shiftOf(event) {
 /** One line: what happened. */
 export function eventTitle(event) {
   const kind = event.kind.charAt(0) + event.kind.slice(1).toLowerCase();
+  if (event.kind === "OPERATOR") return event.number > 0 ? `Forgotten: ${nameOf(event)}` : `Operator: ${ruleText(event.evidence.rule)}`;
   const by = event.kind === "MOVED" ? ` by ${metres(shiftOf(event))}` : "";
   return `${kind}: ${nameOf(event)}${by}`;
 }
@@ -54,7 +65,12 @@ export function eventTitle(event) {
 /** The evidence in sentences: what was measured, what the camera saw, what the belief became. */
 export function evidenceSentences(event) {
   const e = event.evidence, lines = [];
-  lines.push(`Because ${ruleText(event.evidence.rule)}.`);
+  if (event.by) lines.push(`${event.by} said so: ${ruleText(e.rule)}.`);
+  else lines.push(`Because ${ruleText(e.rule)}.`);
+  if (event.last_there && event.first_gone) {
+    lines.push(`It went within ${durationText(Math.max(0, event.first_gone - event.last_there))}: it was last seen in its place at ${timeText(event.last_there)}, and first seen to be gone at ${timeText(event.first_gone)}.`);
+  }
+  if (event.kind === "OPERATOR") return lines;
   if (e.delta !== 0 || e.sigma !== 0) {
     lines.push(`Measured change: ${metres(Math.abs(e.delta))}, give or take ${metres(e.sigma)}.`);
   }

@@ -305,17 +305,19 @@ std::vector<Frame> room_frames(int room, int rooms) {
   return frames;
 }
 
-// POCD_AREA_M2: how much ground; for a large one by hand. Of that, up to 10 000 m2 are rooms with
-// objects and free space, as robots have seen them.
+// POCD_AREA_M2: how much ground; for a large one by hand (POCD_KEEP_MEMORY: a folder in which it is
+// kept). Of that, up to 10 000 m2 are rooms with objects and free space, as robots have seen them.
 TEST(WarehouseMemory, ALargePlaceIsThereSoon) {
   const char* text = std::getenv("POCD_AREA_M2");
   const double area_m2 = text != nullptr ? std::atof(text) : 500.0;
   const int rooms = static_cast<int>(std::min(area_m2, 10000.0) / 40.0);
-  const ScratchFolder folder;
+  const ScratchFolder scratch;
+  const char* kept = std::getenv("POCD_KEEP_MEMORY");
+  const std::filesystem::path folder = kept != nullptr ? kept : scratch / "memory";
   std::uint64_t tiles = 0;
   std::size_t objects = 0;
   {
-    MemoryRunner run(circuit_config(), folder / "memory");
+    MemoryRunner run(circuit_config(), folder);
     build_halls(run.pipeline().map(), area_m2);
     for (int room = 0; room < rooms; ++room) {
       for (const Frame& frame : room_frames(room, rooms)) run.process(frame);
@@ -331,7 +333,7 @@ TEST(WarehouseMemory, ALargePlaceIsThereSoon) {
   const auto since_s = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   };
-  MemoryRunner again(circuit_config(), folder / "memory");
+  MemoryRunner again(circuit_config(), folder);
   const double restored_s = since_s();
   EXPECT_EQ(again.publisher().tiles().size(), tiles);
   EXPECT_EQ(again.pipeline().objects().size(), objects);
@@ -339,7 +341,7 @@ TEST(WarehouseMemory, ALargePlaceIsThereSoon) {
   again.publish();
   const double first_s = since_s();
   EXPECT_LT(first_s, std::max(3.0, 1e-4 * area_m2));
-  const MemoryInfo info = MemoryReader(folder / "memory").info();
+  const MemoryInfo info = MemoryReader(folder).info();
   std::printf(
       "%g m2, %llu tiles, %zu objects, %llu blocks of free space, %.1f MB: restored in %.2f s, "
       "first "

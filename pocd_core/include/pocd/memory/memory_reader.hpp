@@ -70,6 +70,10 @@ class MemoryReader {
   /// measured a surface in each.
   std::vector<std::pair<BlockKey, StampNs>> last_looks();
 
+  /// The tiles of the map as it was published last. Rows that cannot be read are left out, with one
+  /// line each in `damage`.
+  std::vector<MapTile> tiles(std::vector<std::string>& damage);
+
   /// Reads everything: one line for each thing that is wrong.
   std::vector<std::string> verify();
   /// Writes the voxels as save_map() does, of the last step. Throws InputError.
