@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/config/describe.hpp"
+#include "pocd/common/describe.hpp"
 #include "pocd/eval/change_report.hpp"
 
 namespace pocd {
