@@ -11,6 +11,7 @@
 #include "pocd/common/check.hpp"
 #include "pocd/common/natural_order.hpp"
 #include "pocd/config/config_io.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
 

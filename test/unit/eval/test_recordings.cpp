@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "pocd/config/config_io.hpp"
+#include "pocd/datasets/open_dataset.hpp"
 #include "pocd/eval/state_check.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 
