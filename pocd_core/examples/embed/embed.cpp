@@ -28,7 +28,7 @@ int main() {
         pocd::make_frame(stamp_ns, camera, T_W_C, depth_m, labels, cv::Mat(), "example"));
     for (const pocd::ObjectEvent& event : result.events) {
       std::cout << pocd::to_string(event.kind) << " " << config.classes.name(event.class_id)
-                << " at " << event.box.pose.position_W.transpose() << ", E[v] "
+                << " at x = " << event.box.pose.position_W.x() << " m, E[v] "
                 << event.evidence.after.stationarity() << "\n";
     }
     for (const std::string& warning : result.warnings) std::cerr << warning << "\n";

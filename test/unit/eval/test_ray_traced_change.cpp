@@ -99,7 +99,7 @@ TEST(RayTracedChange, GrowsWithNoise) {
 TEST(RayTracedChange, NothingInCommonIsNoMeasurement) {
   Random random(45);
   const Points here = wall(1.0, 0.0, 0.0, random);
-  EXPECT_FALSE(ray_traced_change(here, wall(1.6, 0.0, 0.0, random), 0.6, {}));
+  EXPECT_FALSE(ray_traced_change(here, wall(3.0, 0.0, 0.0, random), 2.0, {}));
   EXPECT_FALSE(ray_traced_change(here, {}, 0.0, {}));
   EXPECT_FALSE(ray_traced_change({}, here, 0.0, {}));
 }
