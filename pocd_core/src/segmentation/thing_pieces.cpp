@@ -72,17 +72,20 @@ class Pieces {
             count > 2 * breaks_[pair])
           join(pair);
       }
-      // The far wall of a container is not the near wall of the next one.
-      std::set<std::size_t> far_walls;
-      for (auto it = edges_.begin(); it != edges_.end();) {
-        const auto& [near, far] = it->first;
-        const int larger = std::max(extents_[near], extents_[far]);
-        const bool rim = it->second >= config_.things.rim_share * larger && same_height(it->first);
-        if (rim) far_walls.insert(far);
-        it = rim ? std::next(it) : edges_.erase(it);
-      }
+      // From near to far: the far wall of a container is not the near wall of the next one.
+      std::vector<Pair> rims;
       for (const auto& [pair, count] : edges_) {
-        if (far_walls.count(pair.first) == 0) join(pair);
+        const int larger = std::max(extents_[pair.first], extents_[pair.second]);
+        if (count >= config_.things.rim_share * larger && same_height(pair)) rims.push_back(pair);
+      }
+      std::stable_sort(rims.begin(), rims.end(), [&](const Pair& a, const Pair& b) {
+        return distance_of(a.first) < distance_of(b.first);
+      });
+      std::set<std::size_t> far_walls;
+      for (const Pair& rim : rims) {
+        if (far_walls.count(rim.first) > 0) continue;
+        far_walls.insert(rim.second);
+        join(rim);
       }
     }
     for (std::size_t k = 0; k < parent.size(); ++k) parent[k] = root(k);
@@ -204,6 +207,10 @@ class Pieces {
   float depth_of(std::int32_t i) const {
     const OrientedBox& box = clusters_[static_cast<std::size_t>(cluster_of_[i])].box;
     return kDeepest * static_cast<float>(std::max(box.size_m.x(), box.size_m.y()));
+  }
+
+  double distance_of(std::size_t cluster) const {
+    return (clusters_[cluster].box.pose.position_W - cloud_.T_W_C.translation()).head<2>().norm();
   }
 
   bool has_top(const Line& column, std::int32_t k) const {

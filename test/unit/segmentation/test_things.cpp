@@ -127,10 +127,10 @@ TEST(Things, OfTwoContainersInARowEachIsOne) {
   // The far wall of the first one stands before the near wall of the second one, as high.
   const Pose above = test::look_from({0, 0.3, 1.5}, 0.0);
   const auto s =
-      things_in(room_with({open_box({0, 1.6}, 0.8, 0.3, 0.3), open_box({0, 2.25}, 0.8, 0.3, 0.3)}),
+      things_in(room_with({open_box({0, 1.9}, 0.8, 0.3, 0.3), open_box({0, 2.5}, 0.8, 0.3, 0.3)}),
                 above, near_config());
-  const std::int32_t first = observation_at(s, {0, 1.43, 0.2});
-  const std::int32_t second = observation_at(s, {0, 2.385, 0.28});
+  const std::int32_t first = observation_at(s, {0, 1.735, 0.2});
+  const std::int32_t second = observation_at(s, {0, 2.635, 0.28});
   ASSERT_NE(first, Observations::kNone);
   ASSERT_NE(second, Observations::kNone);
   EXPECT_NE(first, second);
