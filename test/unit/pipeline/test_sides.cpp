@@ -92,24 +92,6 @@ TEST_F(Sides, TwoThingsWithFreeSpaceBetweenStayTwo) {
   EXPECT_EQ(boxes(), 2u) << text(drive_.events());
 }
 
-// Each is seen on a visit of its own, and nobody looks between them: faces that look one way are
-// not sides of one body.
-TEST_F(Sides, TwoThingsInARowStayTwo) {
-  const Eigen::Vector3d size_m(1.0, 0.5, 1.4);
-  const Scene scene =
-      room_with({solid(kBoxClass, {-0.75, 1.9}, size_m), solid(kBoxClass, {0.75, 1.9}, size_m)});
-  for (const double x : {-1.3, 1.3}) {
-    count_ += 15 * 20;
-    for (int i = 0; i < 40; ++i) {
-      const Pose eye = look_from({x, 0.25 + 0.05 * std::sin(0.3 * i), 1.0}, 0.0, 0.1);
-      Frame frame = shoot(scene, eye, count_++);
-      test::add_noise(frame, config_.depth_noise, 5);
-      drive_.process(frame);
-    }
-  }
-  EXPECT_EQ(boxes(), 2u) << text(drive_.events());
-}
-
 // Nothing is seen between two boxes that touch, but the masks say that they are two.
 TEST_F(Sides, WhatMasksShowAsTwoInstancesStaysTwo) {
   config_.classes.label_divisor = 100;
