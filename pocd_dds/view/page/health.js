@@ -82,8 +82,9 @@ export class Health {
     const unknown = Math.max(this.status?.unknown_objects ?? 0, this.unknown);
     const { earlier_tiles: tiles = 0, regions_not_looked_at: regions = 0 } = this.status ?? {};
     if (!this.status?.played && (tiles > 0 || regions > 0 || unknown > 0)) {
-      const map = regions > 0 ? `${regions} region${regions === 1 ? "" : "s"}` : `${tiles} tile${tiles === 1 ? "" : "s"}`;
-      alarms.push(`Since the restart nobody has looked at ${unknown} object${unknown === 1 ? "" : "s"} and ${map} of the map (striped).`);
+      const count = (number, what) => (number > 0 ? [`${number} ${what}${number === 1 ? "" : "s"}`] : []);
+      const map = regions > 0 ? count(regions, "region") : count(tiles, "tile");
+      alarms.push(`Since the restart nobody has looked at ${[...count(unknown, "object"), ...map.map((part) => `${part} of the map (striped)`)].join(" and ")}.`);
     }
     fill($("nodes"), nodes.join(""));
     fill($("robots"), robots.join(""));
