@@ -10,7 +10,7 @@ class FigureList {
   void count(const char* key, const char* metric, std::uint64_t value) {
     figures_.push_back({key, std::to_string(value), metric, static_cast<double>(value)});
   }
-  /// Shown in ms, given in seconds.
+  /// A time: in ms for diagnostics, in seconds for Prometheus.
   void ms(const char* key, const char* metric, double value_ms) {
     figures_.push_back({key, std::to_string(value_ms), metric, 1e-3 * value_ms});
   }

@@ -312,6 +312,7 @@ void Recorder::Impl::write_all() {
       write(sample.header, sample.payload.data(), sample.payload.size());
     });
   });
+  bool told = false;  // that the ring is larger than asked for
   try {
     while (!queue.finished()) {
       std::optional<QueuedSample> sample = queue.pop(std::chrono::milliseconds(100));
@@ -324,6 +325,10 @@ void Recorder::Impl::write_all() {
       if (Clock::now() - flushed >= period) {
         writer.flush();
         flushed = Clock::now();
+        if (!told && !writer.problem().empty()) {
+          spdlog::warn("{}", writer.problem());
+          told = true;
+        }
       }
     }
     const std::lock_guard<std::mutex> lock(writer_mutex);

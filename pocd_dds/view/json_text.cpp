@@ -115,6 +115,18 @@ Json robot_json(const RobotPose& pose) {
           {"view", pose.view}};
 }
 
+Json played_json(const std::string& kind, const std::string& name, double read,
+                 const std::string& problem) {
+  return {{"type", "status"},
+          {"in_step", true},
+          {"stale_because", ""},
+          {"publisher_present", false},
+          {"publisher_seen", true},
+          {"ended", true},
+          {"drawing", read < 1.0},
+          {"played", {{"kind", kind}, {"name", name}, {"read", read}, {"problem", problem}}}};
+}
+
 Json health_json(const pocd_msgs::msg::NodeHealth& health, const std::string& condition) {
   Json robots = Json::array(), problems = Json::array(), departures = Json::array();
   for (const auto& robot : health.robots()) {

@@ -39,6 +39,10 @@ Json object_json(const WatchedObject& object, std::uint32_t run, const std::stri
 Json event_json(const pocd_msgs::msg::ObjectEvent& message, std::uint64_t number,
                 std::uint32_t run);
 Json robot_json(const RobotPose& pose);
+/// The status of what is played: it is in step with itself. `kind`: recording or memory; `read`:
+/// the share that has been read; `problem`: what is damaged, or empty.
+Json played_json(const std::string& kind, const std::string& name, double read,
+                 const std::string& problem);
 Json health_json(const pocd_msgs::msg::NodeHealth& health, const std::string& condition);
 Json sample_json(const ObjectSample& sample);
 Json record_json(const std::string& uuid, const History::Record& record);

@@ -23,7 +23,7 @@ bool same_place(const OrientedBox& a, const OrientedBox& b) {
 
 std::uint32_t ObjectFeed::run_of_locked(std::uint64_t epoch, std::uint64_t lineage) {
   if (epoch == 0) return 0;
-  lineages_[epoch] = lineage != 0 ? lineage : epoch;
+  lineages_[epoch] = dds::MapRun{0, epoch, lineage}.names();
   const auto next = static_cast<std::uint32_t>(runs_.size() + 1);
   return runs_.emplace(lineages_[epoch], next).first->second;
 }
@@ -95,7 +95,8 @@ void ObjectFeed::say_gone(const WatchedObject& object, const std::string& why) {
 }
 
 bool ObjectFeed::say_event(const pocd_msgs::msg::ObjectEvent& message) {
-  const EventName name{message.lineage() != 0 ? message.lineage() : message.epoch(), message.seq()};
+  const dds::MapRun run{message.map_id(), message.epoch(), message.lineage()};
+  const EventName name{run.names(), message.seq()};
   if (!known_events_.insert(name).second) return false;
   heard(dds::to_stamp(message.header().stamp()));
   const std::uint64_t number = ++event_count_;

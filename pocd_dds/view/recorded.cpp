@@ -233,11 +233,12 @@ void Recorded::Impl::object_gone(const std::array<std::uint8_t, 16>& uuid, Gone 
 void Recorded::Impl::manifest(const msg::MapManifest& message) {
   if (message.map_id() != options.map_id) return;
   objects.know_run(message.epoch(), message.lineage());
-  const std::uint64_t names = message.lineage() != 0 ? message.lineage() : message.epoch();
+  const auto names = dds::MapRun{options.map_id, message.epoch(), message.lineage()}.names();
   if (last_manifest && last_manifest->epoch() != message.epoch()) {
     std::vector<std::array<std::uint8_t, 16>> others;
     for (const auto& [uuid, object] : known) {
-      if ((object.lineage != 0 ? object.lineage : object.epoch) != names) others.push_back(uuid);
+      const dds::MapRun run{options.map_id, object.epoch, object.lineage};
+      if (run.names() != names) others.push_back(uuid);
     }
     for (const auto& uuid : others) object_gone(uuid, Gone::kReplaced);
     if (!follower.gathering()) follower.start_gathering();
@@ -358,29 +359,19 @@ void Recorded::Impl::say_status() {
       end_ns <= start_ns || log_ns < start_ns
           ? 0.0
           : static_cast<double>(log_ns - start_ns) / static_cast<double>(end_ns - start_ns);
-  Json json = {{"type", "status"},
-               {"in_step", true},
-               {"stale_because", ""},
-               {"run", objects.run_of(drawn_epoch)},
-               {"epoch", hex(drawn_epoch)},
-               {"version", replica.version()},
-               {"tiles", replica.tiles().size()},
-               {"objects", known.size()},
-               {"publisher_present", false},
-               {"publisher_seen", true},
-               {"ended", true},
-               {"voxel", last_manifest ? last_manifest->voxel_size() : 0.0},
-               {"drawing", !finished},
-               {"drawn", maker.drawn()},
-               {"earlier_tiles", maker.earlier_tiles()},
-               {"regions_not_looked_at", not_looked_at},
-               {"unknown_objects", objects.unknown()},
-               {"unreadable", unreadable.load()},
-               {"played",
-                {{"kind", "recording"},
-                 {"name", files.path(0).filename().string()},
-                 {"read", finished ? 1.0 : std::min(0.99, share)},
-                 {"problem", problem}}}};
+  Json json = played_json("recording", files.path(0).filename().string(),
+                          finished ? 1.0 : std::min(0.99, share), problem);
+  json["run"] = objects.run_of(drawn_epoch);
+  json["epoch"] = hex(drawn_epoch);
+  json["version"] = replica.version();
+  json["tiles"] = replica.tiles().size();
+  json["objects"] = known.size();
+  json["voxel"] = last_manifest ? last_manifest->voxel_size() : 0.0;
+  json["drawn"] = maker.drawn();
+  json["earlier_tiles"] = maker.earlier_tiles();
+  json["regions_not_looked_at"] = not_looked_at;
+  json["unknown_objects"] = objects.unknown();
+  json["unreadable"] = unreadable.load();
   if (const auto range = objects.time_range()) json["time"] = {range->first, range->second};
   if (const auto since = board.map_known_since()) json["map_since"] = seconds(*since);
   board.put_notice("status", text_of(json));

@@ -142,28 +142,13 @@ void Remembered::draw() {
 }
 
 void Remembered::say_status(double read) {
-  Json json = {{"type", "status"},
-               {"in_step", true},
-               {"stale_because", ""},
-               {"run", objects_.run_of(epoch_)},
-               {"epoch", hex(epoch_)},
-               {"version", info_.map_version},
-               {"tiles", info_.tiles},
-               {"objects", standing_},
-               {"publisher_present", false},
-               {"publisher_seen", true},
-               {"ended", true},
-               {"voxel", info_.voxel_size_m},
-               {"drawing", read < 1.0},
-               {"earlier_tiles", 0},
-               {"regions_not_looked_at", 0},
-               {"unknown_objects", 0},
-               {"unreadable", 0},
-               {"played",
-                {{"kind", "memory"},
-                 {"name", name_},
-                 {"read", read},
-                 {"problem", damage_.empty() ? "" : damage_.front()}}}};
+  Json json = played_json("memory", name_, read, damage_.empty() ? "" : damage_.front());
+  json["run"] = objects_.run_of(epoch_);
+  json["epoch"] = hex(epoch_);
+  json["version"] = info_.map_version;
+  json["tiles"] = info_.tiles;
+  json["objects"] = standing_;
+  json["voxel"] = info_.voxel_size_m;
   if (const auto range = objects_.time_range()) {
     json["time"] = {range->first, std::max(range->second, seconds(info_.stamp_ns))};
   }

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <cstdio>
 #include <iomanip>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "pocd/common/check.hpp"
+#include "pocd/common/image_codec.hpp"
 
 namespace pocd {
 namespace {
@@ -23,16 +23,6 @@ cv::Mat in_millimetres(const cv::Mat& depth_m) {
     }
   }
   return out;
-}
-
-void write_png(const std::filesystem::path& file, const cv::Mat& image) {
-  bool good = false;
-  try {
-    // Level 1: three times faster than the default for files a tenth larger.
-    good = cv::imwrite(file.string(), image, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  } catch (const cv::Exception&) {
-  }
-  if (!good) throw InputError(file.string() + ": cannot be written");
 }
 
 }  // namespace

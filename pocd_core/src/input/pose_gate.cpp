@@ -50,7 +50,7 @@ void PoseGate::accept(Track& track, const Pose& pose, StampNs stamp_ns) const {
   track.refused_in_a_row = 0;
 }
 
-void PoseGate::forget_one_but(const std::string& robot) {
+void PoseGate::forget_oldest_but(const std::string& robot) {
   auto oldest = tracks_.end();
   StampNs oldest_ns = 0;
   for (auto it = tracks_.begin(); it != tracks_.end(); ++it) {
@@ -64,7 +64,7 @@ void PoseGate::forget_one_but(const std::string& robot) {
 
 std::optional<std::string> PoseGate::refuse(const Frame& frame) {
   const auto [it, fresh] = tracks_.try_emplace(frame.robot);
-  if (tracks_.size() > kMostRobots) forget_one_but(frame.robot);
+  if (tracks_.size() > kMostRobots) forget_oldest_but(frame.robot);
   Track& track = it->second;
   double jump_m = 0.0, turn_deg = 0.0;
   bool ok = fresh || (plausible(track.accepted, track.accepted_ns, frame.T_W_C, frame.stamp_ns,

@@ -70,7 +70,11 @@ void SplitWriter::find_earlier() {
 void SplitWriter::trim() {
   while (!closed_.empty() && bytes_written() > options_.keep_bytes) {
     std::error_code error;
-    std::filesystem::remove(files_.front(), error);  // one that is gone already is as good
+    std::filesystem::remove(files_.front(), error);  // one that is gone already is no error
+    if (error && problem_.empty()) {
+      problem_ =
+          files_.front().string() + ": cannot be removed, the ring is larger: " + error.message();
+    }
     bytes_before_ -= closed_.front();
     closed_.erase(closed_.begin());
     files_.erase(files_.begin());

@@ -27,13 +27,11 @@ bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) co
   const bool a_less = a.model.surfels().size() < b.model.surfels().size();
   const LibraryObject& small = a_less ? a : b;
   const LibraryObject& large = a_less ? b : a;
-  const auto reach = static_cast<float>(
-      std::max(config_.segmentation.cluster_tolerance_m, 2.0 * config_.map.voxel_size_m));
   int contacts = 0, checked = 0;
   for (const Surfel& s : small.model.surfels()) {
     if (s.hits < 2 || s.seen_through > 0) continue;
     ++checked;
-    const int other = large.model.nearest(s.point_W, reach);
+    const int other = large.model.nearest(s.point_W, static_cast<float>(contact_m()));
     contacts += other != ObjectModel::kNone && large.model.surfels()[other].seen_through == 0;
   }
   // A seam, not a spot: about the square root of the smaller surface's size.

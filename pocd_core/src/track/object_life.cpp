@@ -198,9 +198,10 @@ void ObjectTracker::begin_anew(Step& step, LibraryObject& object) {
 
 void ObjectTracker::clear_gone(Step& step, ObjectId id,
                                const std::function<bool(const Eigen::Vector3d&)>& inside) {
+  const Pose T_C_W = step.cloud.T_W_C.inverse();
   const double near_m = 2.0 * config_.map.voxel_size_m;
   const auto measured_now = [&](const Eigen::Vector3d& center_W) {
-    const auto view = view_of(step.cloud, center_W);
+    const auto view = view_of(step.cloud, T_C_W, center_W);
     return view && view->depth_m >= near_m && std::abs(view->measured_m - view->depth_m) < near_m;
   };
   std::vector<const LibraryObject*> others;

@@ -27,8 +27,9 @@ constexpr double kClearVoxels = 1.5;
 
 }  // namespace
 
-std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Eigen::Vector3d& point_W) {
-  const Eigen::Vector3d p = cloud.T_W_C.inverse() * point_W;
+std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Pose& T_C_W,
+                                 const Eigen::Vector3d& point_W) {
+  const Eigen::Vector3d p = T_C_W * point_W;
   if (p.z() <= 0.0) return std::nullopt;
   const int col = static_cast<int>(cloud.camera.fx * p.x() / p.z() + cloud.camera.cx + 0.5);
   const int row = static_cast<int>(cloud.camera.fy * p.y() / p.z() + cloud.camera.cy + 0.5);
@@ -337,6 +338,10 @@ bool ObjectTracker::seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) con
   // Near surfaces the map knows better.
   const auto distance_m = map.distance_at(point_W, FreeSpace::kLooks);
   return distance_m && *distance_m > kClearVoxels * config_.map.voxel_size_m;
+}
+
+double ObjectTracker::contact_m() const {
+  return std::max(config_.segmentation.cluster_tolerance_m, 2.0 * config_.map.voxel_size_m);
 }
 
 std::size_t ObjectTracker::least_surfels() const {

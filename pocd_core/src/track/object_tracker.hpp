@@ -150,6 +150,8 @@ class ObjectTracker {
                          const std::string& rule);
   bool seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const;
   Arrival arrival_of(const LibraryObject& object) const;
+  /// Surfaces that are no farther apart touch each other [m].
+  double contact_m() const;
   /// Surfels that make a piece of surface of the least area that counts.
   std::size_t least_surfels() const;
 

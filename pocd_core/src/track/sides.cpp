@@ -85,15 +85,13 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const Libra
   lines.resize((lines.size() + 1) / 2);
   if (lines.front().length_m > reach_m) return false;
   const auto cell_m = static_cast<float>(2.0 * config_.map.voxel_size_m);
-  const auto contact_m = static_cast<float>(
-      std::max(config_.segmentation.cluster_tolerance_m, 2.0 * config_.map.voxel_size_m));
   std::size_t crossing = 0;
   for (const Line& line : lines) {
     const Eigen::Vector3f along =
         (line.to->point_W - line.from->point_W) / std::max(line.length_m, 1e-6f);
     const float leaves = line.from->normal_W.dot(along), enters = -line.to->normal_W.dot(along);
     bool open = line.length_m > reach_m || std::max(leaves, enters) > kOutside ||
-                (line.length_m > contact_m && leaves + enters > -kApart);
+                (line.length_m > contact_m() && leaves + enters > -kApart);
     for (float at = cell_m; !open && at < line.length_m - 0.5f * cell_m; at += 0.5f * cell_m)
       open = seen_empty(step.map, line.from->point_W + at * along);
     crossing += open;

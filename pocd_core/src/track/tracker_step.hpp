@@ -36,8 +36,10 @@ struct PixelView {
   double depth_m = 0.0;
   double measured_m = 0.0;
 };
-/// Nothing when the point [m, W] is not in front of the camera or outside of the image.
-std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Eigen::Vector3d& point_W);
+/// Nothing when the point [m, W] is not in front of the camera or outside of the image. `T_C_W`:
+/// the inverse of the cloud's pose, made once for many points.
+std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Pose& T_C_W,
+                                 const Eigen::Vector3d& point_W);
 
 /// The surfels after a motion [m, W]; none of them has been seen through there.
 std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose& T_new_old);

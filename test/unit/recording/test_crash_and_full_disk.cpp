@@ -195,6 +195,27 @@ TEST(SplitWriter, EveryFileBeginsWithTheHead) {
 }
 
 // The last hours of a robot, whatever happened to the recorder meanwhile.
+TEST(SplitWriter, ARingNamesWhatItCannotRemoveAndGoesOn) {
+  const TemporaryFolder folder;
+  SplitOptions options;
+  options.mcap.chunk_bytes = 500;
+  options.mcap.compression = "";
+  options.most_bytes = 5'000;
+  options.keep_bytes = 15'000;
+  std::filesystem::create_directories(folder / "run_0000.mcap" / "full");  // no file of a recorder
+  SplitWriter writer(folder / "run.mcap", options);
+  const auto schema = writer.add_schema("a", "ros2msg", "uint8 a\n");
+  const auto a = writer.add_channel(schema, "/a", "cdr", {});
+  const Bytes data(300, 1);
+  EXPECT_EQ(writer.problem(), "");
+  for (std::uint32_t i = 0; i < 200; ++i) writer.write({a, i, 1000 + i, 0}, data.data(), 300);
+  writer.close();
+  EXPECT_NE(writer.problem().find("run_0000.mcap: cannot be removed"), std::string::npos)
+      << writer.problem();
+  EXPECT_TRUE(std::filesystem::exists(folder / "run_0000.mcap" / "full"));
+  EXPECT_EQ(read_all(*open_recording(writer.files().back())).back().log_time_ns, 1199u);
+}
+
 TEST(SplitWriter, ARingKeepsTheLatestAlsoOverRuns) {
   const TemporaryFolder folder;
   SplitOptions options;

@@ -51,9 +51,9 @@ struct StateConfig {
           "A point of an object that is seen through in this many frames in a row is dropped "
           "[frames]; 0: never.");
     visit("wait_for_doubt_frames", wait_for_doubt_frames, Range{0, 100000},
-          "How much longer the report of a new object waits while a like one is seen through: both "
-          "are "
-          "one MOVED then [frames].");
+          "How much longer the report of a new object waits while a like one is seen through or "
+          "found "
+          "displaced: both are one MOVED then [frames].");
     visit("merge_frames", merge_frames, Range{1, 100000},
           "Objects of one class that share an observation in this many frames are one [frames].");
     visit(

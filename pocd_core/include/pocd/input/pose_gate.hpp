@@ -64,7 +64,7 @@ class PoseGate {
 
   /// Whether the pose lies on the way that the accepted poses led.
   bool on_its_way(const Track& track, const Pose& pose, StampNs stamp_ns) const;
-  void forget_one_but(const std::string& robot);
+  void forget_oldest_but(const std::string& robot);
   void accept(Track& track, const Pose& pose, StampNs stamp_ns) const;
 
   PoseGateConfig config_;

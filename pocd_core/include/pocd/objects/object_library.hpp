@@ -62,9 +62,9 @@ struct LibraryObject {
   int looks_missed = 0;             ///< tentative only: in view without being fused
   int looks_unobserved = 0;         ///< in a row: its place was seen empty
   StampNs unobserved_since_ns = 0;  ///< the first of them
-  int looks_displaced = 0;          ///< in a row: aligned beside its place
-  int looks_losing = 0;             ///< in a row: a part of it is seen through
-  std::size_t lost = 0;             ///< points eroded since the last event
+  int looks_displaced = 0;  ///< found it beside its place, since one found it there uncontested
+  int looks_losing = 0;     ///< in a row: a part of it is seen through
+  std::size_t lost = 0;     ///< points eroded since the last event
   /// Objects seen in one piece with it: in how many looks, or kToldApart.
   std::map<ObjectId, int> companions;
   static constexpr int kToldApart = -1;  ///< masks showed them as two things

@@ -55,6 +55,9 @@ class SplitWriter {
   std::uint64_t bytes_written() const { return bytes_before_ + writer_->bytes_written(); }
   /// That there are; the last one is being written.
   const std::vector<std::filesystem::path>& files() const { return files_; }
+  /// Of a ring: the first file that could not be removed, and why; the ring is larger by it. Else
+  /// empty.
+  const std::string& problem() const { return problem_; }
 
  private:
   struct FileCount {
@@ -76,6 +79,7 @@ class SplitWriter {
   std::vector<FileCount> counts_;      // of each
   std::vector<std::uint64_t> closed_;  // bytes of each but the present one
   std::size_t next_number_ = 0;
+  std::string problem_;
   std::map<std::uint16_t, std::uint64_t> messages_of_;
   bool listed_ = true;
   std::uint64_t bytes_before_ = 0;

@@ -71,7 +71,10 @@ struct SegmentationConfig {
           "Clusters with fewer pixels (after the stride) are dropped.");
     visit("max_height_m", max_height_m, Range{0.1, 100.0},
           "Points higher above the ground than this are background [m].");
-    visit.group("things", things, "Telling things by geometry, for robots that send no masks.");
+    visit.group("things", things,
+                "Telling things by geometry: pieces of one thing where masks carry no instances, "
+                "and what is "
+                "a thing where there are no masks.");
   }
 };
 
