@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -135,6 +136,8 @@ inline std::size_t pixel_of(const OrganizedCloud& cloud, const Eigen::Vector3d& 
   const Eigen::Vector3d p_C = cloud.T_W_C.inverse() * point_W;
   const auto col = std::lround(cloud.camera.fx * p_C.x() / p_C.z() + cloud.camera.cx);
   const auto row = std::lround(cloud.camera.fy * p_C.y() / p_C.z() + cloud.camera.cy);
+  if (p_C.z() <= 0 || col < 0 || col >= cloud.width || row < 0 || row >= cloud.height)
+    throw std::out_of_range("pixel_of: the camera does not see the point");
   return static_cast<std::size_t>(row * cloud.width + col);
 }
 

@@ -16,6 +16,8 @@ constexpr double kPartShare = 0.1;
 /// The rest of an object that is found gone stands when at least this share of what was seen since
 /// is in place.
 constexpr double kStandingShare = 0.15;
+/// What is found gone is an edge of what was measured on this visit up to this share of it.
+constexpr double kEdgeShare = 0.1;
 /// Looks in a row before a known object is taken for gone, whatever its belief.
 constexpr int kGoneLooks = 3;
 /// A candidate that was seen through in this many looks was never there, or moves.
@@ -252,6 +254,8 @@ void ObjectTracker::remove_objects(Step& step) {
     }
     // An act is no larger than its evidence: what was measured in place since stands.
     const auto& surfels = object->model.surfels();
+    const Pose T_C_W = step.cloud.T_W_C.inverse();
+    std::vector<std::size_t> passed;
     std::vector<std::uint8_t> gone(surfels.size(), 0), standing(surfels.size(), 0);
     std::size_t gone_count = 0, standing_count = 0;
     for (std::size_t i = 0; i < surfels.size(); ++i) {
@@ -259,6 +263,16 @@ void ObjectTracker::remove_objects(Step& step) {
       standing[i] = !gone[i] && surfels[i].last_hit_ns >= object->unobserved_since_ns;
       gone_count += gone[i];
       standing_count += standing[i];
+      if (!gone[i] && !standing[i] && surfels[i].last_hit_ns >= object->visit_ns &&
+          !view_of(step.cloud, T_C_W, surfels[i].point_W.cast<double>())) {
+        passed.push_back(i);
+      }
+    }
+    // So does what was measured on this visit and is out of view now, unless much is found gone.
+    if (static_cast<double>(gone_count) <=
+        kEdgeShare * static_cast<double>(gone_count + standing_count + passed.size())) {
+      for (const std::size_t i : passed) standing[i] = 1;
+      standing_count += passed.size();
     }
     if (static_cast<double>(standing_count) <=
         kStandingShare * static_cast<double>(standing_count + gone_count)) {

@@ -129,7 +129,7 @@ TEST(Things, OfTwoContainersInARowEachIsOne) {
   const auto s =
       things_in(room_with({open_box({0, 1.9}, 0.8, 0.3, 0.3), open_box({0, 2.5}, 0.8, 0.3, 0.3)}),
                 above, near_config());
-  const std::int32_t first = observation_at(s, {0, 1.735, 0.2});
+  const std::int32_t first = observation_at(s, {0, 1.735, 0.28});
   const std::int32_t second = observation_at(s, {0, 2.635, 0.28});
   ASSERT_NE(first, Observations::kNone);
   ASSERT_NE(second, Observations::kNone);
