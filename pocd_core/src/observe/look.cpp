@@ -13,7 +13,7 @@ constexpr int kLeastPoints = 5;
 /// What decides about most of what is seen.
 constexpr double kMajority = 0.5;
 /// A place is contested when this share of what is seen of it is seen through or covered.
-constexpr double kContestedShare = 0.25;
+constexpr double kContestedShare = 0.2;
 /// From this share on it is asked whether what stands there fits its surface.
 constexpr double kDoubtfulShare = 0.1;
 /// What was measured within its box fits the surface of an object that is in its place.
