@@ -14,6 +14,7 @@
 #include "mirror/part_assembler.hpp"
 #include "mirror/publishers.hpp"
 #include "mirror/reading_thread.hpp"
+#include "mirror/rejoin_plan.hpp"
 #include "mirror/shared_participant.hpp"
 #include "pocd/map/map_follower.hpp"
 #include "pocd_dds/bridge/input_problem.hpp"
@@ -58,23 +59,40 @@ std::string conflict(std::uint32_t map_id, std::uint64_t followed,
   return text;
 }
 
-}  // namespace
-
-struct MapMirror::Impl {
-  explicit Impl(const MirrorOptions& given)
-      : options(given),
-        id(random_id()),
-        participant(dds::shared_participant(
-            {given.domain, given.profiles_file, given.name, given.security_folder})),
+/// What a mirror has on the bus. It goes and comes as a whole.
+struct MapMirrorBus {
+  MapMirrorBus(std::shared_ptr<dds::Participant> of, const MirrorOptions& options,
+               dds::Wakeup& wakeup)
+      : participant(std::move(of)),
         manifests(participant, dds::topics::kMapManifest, wakeup),
         deltas(participant, dds::topics::kMapDeltas, wakeup),
         object_states(participant, dds::topics::kObjects, dds::topics::kObjects.name,
                       objects_of_all_maps(), wakeup),
         events(participant, dds::topics::kObjectEvents, wakeup),
         requests(participant, dds::topics::kSnapshotRequest),
-        look_states(given.looks ? std::make_unique<dds::Reader<msg::MapLooksPubSubType>>(
-                                      participant, dds::topics::kMapLooks, wakeup)
-                                : nullptr),
+        look_states(options.looks ? std::make_unique<dds::Reader<msg::MapLooksPubSubType>>(
+                                        participant, dds::topics::kMapLooks, wakeup)
+                                  : nullptr) {}
+
+  std::shared_ptr<dds::Participant> participant;
+  dds::Reader<msg::MapManifestPubSubType> manifests;
+  dds::Reader<msg::MapDeltaPubSubType> deltas;
+  dds::Reader<msg::ObjectStatePubSubType> object_states;
+  dds::Reader<msg::ObjectEventPubSubType> events;
+  dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
+  std::unique_ptr<dds::Reader<msg::MapLooksPubSubType>> look_states;  // null: not wanted
+  // Only while snapshots are waited for, or tiles are gathered.
+  std::unique_ptr<dds::Reader<msg::MapSnapshotReplyPubSubType>> replies;
+  std::unique_ptr<dds::Reader<msg::MapTilePubSubType>> tiles;
+};
+
+}  // namespace
+
+struct MapMirror::Impl {
+  explicit Impl(const MirrorOptions& given)
+      : options(given),
+        id(random_id()),
+        bus(join(nullptr)),
         plan(given.catch_up),
         objects(given.map_id),
         looks(given.map_id),
@@ -87,7 +105,11 @@ struct MapMirror::Impl {
   }
 
   void tell(const std::string& text) const { dds::log_error("{}: {}", options.name, text); }
+  /// With a participant that others may share, but not with this one.
+  std::unique_ptr<MapMirrorBus> join(const std::shared_ptr<dds::Participant>& instead_of);
   void turn();
+  void join_anew_if_deaf();
+  void stop_gathering();
   /// Of this map, and not of a publisher beside the one that is followed.
   template <class Message>
   bool ours(const Message& message) const {
@@ -108,17 +130,10 @@ struct MapMirror::Impl {
   const MirrorOptions options;
   const std::array<std::uint8_t, 16> id;
   dds::Wakeup wakeup;
-  std::shared_ptr<dds::Participant> participant;
-  dds::Reader<msg::MapManifestPubSubType> manifests;
-  dds::Reader<msg::MapDeltaPubSubType> deltas;
-  dds::Reader<msg::ObjectStatePubSubType> object_states;
-  dds::Reader<msg::ObjectEventPubSubType> events;
-  dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
-  std::unique_ptr<dds::Reader<msg::MapLooksPubSubType>> look_states;  // null: not wanted
-
-  // Only while snapshots are waited for, or tiles are gathered; by the thread.
-  std::unique_ptr<dds::Reader<msg::MapSnapshotReplyPubSubType>> replies;
-  std::unique_ptr<dds::Reader<msg::MapTilePubSubType>> tiles;
+  /// Only the thread replaces it, under the mutex.
+  std::unique_ptr<MapMirrorBus> bus;
+  dds::RejoinPlan rejoining;
+  // While tiles are gathered; by the thread.
   std::map<std::array<std::uint8_t, 16>, std::uint64_t> epoch_of_writer;
   std::map<std::array<std::uint8_t, 16>, TileKey> tile_of_instance;
   dds::CatchUpPlan plan;
@@ -143,13 +158,43 @@ struct MapMirror::Impl {
   dds::ReadingThread thread;
 };
 
+std::unique_ptr<MapMirrorBus> MapMirror::Impl::join(
+    const std::shared_ptr<dds::Participant>& instead_of) {
+  return std::make_unique<MapMirrorBus>(
+      dds::shared_participant(
+          {options.domain, options.profiles_file, options.name, options.security_folder},
+          instead_of),
+      options, wakeup);
+}
+
+void MapMirror::Impl::join_anew_if_deaf() {
+  const auto now = Clock::now();
+  const auto silence = publishers.silence(now);
+  if (!rejoining.due(now, silence)) return;
+  dds::log_warning("{}: nothing was heard of the publisher for {} s: joins the bus anew",
+                   options.name, std::chrono::duration_cast<std::chrono::seconds>(silence).count());
+  // The new one before the old one goes, so that it gets other ports.
+  std::unique_ptr<MapMirrorBus> other = join(bus->participant);
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (bus->tiles) stop_gathering();
+  bus.swap(other);
+}
+
+void MapMirror::Impl::stop_gathering() {
+  bus->tiles.reset();
+  follower.stop_gathering();
+  epoch_of_writer.clear();
+  tile_of_instance.clear();
+}
+
 void MapMirror::Impl::turn() {
   wakeup.wait_for(kIdle);
+  join_anew_if_deaf();
   take_events();
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    objects.take(object_states, kMost);
-    if (look_states) damaged += looks.take(*look_states, kMost);
+    objects.take(bus->object_states, kMost);
+    if (bus->look_states) damaged += looks.take(*bus->look_states, kMost);
     take_deltas();
     take_replies();
     take_manifests();
@@ -161,7 +206,7 @@ void MapMirror::Impl::turn() {
 }
 
 void MapMirror::Impl::take_events() {
-  events.take_some(kMost, [&](const msg::ObjectEvent& message, const dds::SampleMeta& meta) {
+  bus->events.take_some(kMost, [&](const msg::ObjectEvent& message, const dds::SampleMeta& meta) {
     if (!meta.valid || !options.on_event || message.map_id() != options.map_id) return;
     callbacks.call([this, event = dds::event_from(message), name = message.class_name()] {
       options.on_event(event, name);
@@ -170,14 +215,15 @@ void MapMirror::Impl::take_events() {
 }
 
 void MapMirror::Impl::take_manifests() {
-  manifests.take_some(kMost, [&](const msg::MapManifest& message, const dds::SampleMeta& meta) {
+  bus->manifests.take_some(kMost, [&](const msg::MapManifest& message,
+                                      const dds::SampleMeta& meta) {
     if (!meta.valid || message.map_id() != options.map_id) return;
     if (!publishers.heard(meta.writer, message.epoch(), message.final_version(), Clock::now())) {
       return;
     }
     // A run has one writer as long as it lives.
     if (manifest && manifest->epoch() == message.epoch() && meta.writer != manifest_writer) {
-      problems.count(manifests.topic(), "epoch_reused",
+      problems.count(bus->manifests.topic(), "epoch_reused",
                      "epoch " + std::to_string(message.epoch()) + " names two runs", 1);
       follower.forget();
     }
@@ -191,12 +237,12 @@ void MapMirror::Impl::take_manifests() {
     manifest = message;
   });
   if (manifest) objects.settle(*manifest);
-  publishers.forget_gone([&](const auto& writer) { return manifests.has_writer(writer); },
+  publishers.forget_gone([&](const auto& writer) { return bus->manifests.has_writer(writer); },
                          Clock::now());
 }
 
 void MapMirror::Impl::take_deltas() {
-  deltas.take_some(kMost, [&](const msg::MapDelta& message, const dds::SampleMeta& meta) {
+  bus->deltas.take_some(kMost, [&](const msg::MapDelta& message, const dds::SampleMeta& meta) {
     if (!meta.valid || !ours(message)) return;
     if (follower.follows(message.epoch(), message.base_version())) plan.progress(Clock::now());
     const auto parts = delta_parts.add({message.epoch(), message.version()}, message);
@@ -211,27 +257,28 @@ void MapMirror::Impl::take_deltas() {
 }
 
 void MapMirror::Impl::take_replies() {
-  if (!replies) return;
-  replies->take_some(kMost, [&](const msg::MapSnapshotReply& message, const dds::SampleMeta& meta) {
-    if (!meta.valid || !ours(message)) return;
-    // Others ask, too: what this copy has no use for is not kept.
-    if (!follower.needs(dds::snapshot_header(message))) return;
-    plan.progress(Clock::now());
-    const auto parts =
-        reply_parts.add({message.epoch(), message.version(), message.base_version()}, message);
-    if (!parts) return;
-    std::optional<MapSnapshot> snapshot = dds::snapshot_from(*parts);
-    if (snapshot) {
-      follower.snapshot(std::move(*snapshot));
-    } else {
-      ++damaged;
-    }
-  });
+  if (!bus->replies) return;
+  bus->replies->take_some(
+      kMost, [&](const msg::MapSnapshotReply& message, const dds::SampleMeta& meta) {
+        if (!meta.valid || !ours(message)) return;
+        // Others ask, too: what this copy has no use for is not kept.
+        if (!follower.needs(dds::snapshot_header(message))) return;
+        plan.progress(Clock::now());
+        const auto parts =
+            reply_parts.add({message.epoch(), message.version(), message.base_version()}, message);
+        if (!parts) return;
+        std::optional<MapSnapshot> snapshot = dds::snapshot_from(*parts);
+        if (snapshot) {
+          follower.snapshot(std::move(*snapshot));
+        } else {
+          ++damaged;
+        }
+      });
 }
 
 void MapMirror::Impl::take_tiles() {
-  if (!tiles) return;
-  tiles->take_some(kMost, [&](const msg::MapTile& message, const dds::SampleMeta& meta) {
+  if (!bus->tiles) return;
+  bus->tiles->take_some(kMost, [&](const msg::MapTile& message, const dds::SampleMeta& meta) {
     // One that is new leads on; changes of known ones go on for ever.
     if (tile_of_instance.count(meta.key) == 0) plan.progress(Clock::now());
     if (meta.valid) {
@@ -254,9 +301,9 @@ void MapMirror::Impl::take_tiles() {
 }
 
 void MapMirror::Impl::count_damaged() {
-  for (dds::RawReader* reader :
-       std::initializer_list<dds::RawReader*>{&manifests, &deltas, &object_states, &events,
-                                              look_states.get(), replies.get(), tiles.get()}) {
+  for (dds::RawReader* reader : std::initializer_list<dds::RawReader*>{
+           &bus->manifests, &bus->deltas, &bus->object_states, &bus->events, bus->look_states.get(),
+           bus->replies.get(), bus->tiles.get()}) {
     if (reader != nullptr) problems.count_damaged(*reader);
   }
 }
@@ -275,23 +322,20 @@ void MapMirror::Impl::catch_up() {
   }
   last_at = at;
   const bool stale = manifest && !follower.current() && publishers.present();
-  const bool hears = replies && replies->matched() > 0;
-  const auto wish = plan.next(Clock::now(), {stale, requests.matched() > 0, hears});
-  if (!wish.listen) replies.reset();
-  if (wish.listen && !replies) {
-    replies = std::make_unique<dds::Reader<msg::MapSnapshotReplyPubSubType>>(
-        participant, dds::topics::kSnapshotReply, wakeup);
+  const bool hears = bus->replies && bus->replies->matched() > 0;
+  const auto wish = plan.next(Clock::now(), {stale, bus->requests.matched() > 0, hears});
+  if (!wish.listen) bus->replies.reset();
+  if (wish.listen && !bus->replies) {
+    bus->replies = std::make_unique<dds::Reader<msg::MapSnapshotReplyPubSubType>>(
+        bus->participant, dds::topics::kSnapshotReply, wakeup);
   }
-  if (tiles && (!wish.gather || wish.restart)) {
-    tiles.reset();
-    follower.stop_gathering();
-    epoch_of_writer.clear();
-    tile_of_instance.clear();
+  if (bus->tiles && (!wish.gather || wish.restart)) {
+    stop_gathering();
   }
-  if (wish.gather && !tiles) {
+  if (wish.gather && !bus->tiles) {
     follower.start_gathering();
-    tiles = std::make_unique<dds::Reader<msg::MapTilePubSubType>>(participant,
-                                                                  dds::topics::kMapTiles, wakeup);
+    bus->tiles = std::make_unique<dds::Reader<msg::MapTilePubSubType>>(
+        bus->participant, dds::topics::kMapTiles, wakeup);
   }
   if (wish.ask) ask();
 }
@@ -303,7 +347,7 @@ void MapMirror::Impl::ask() {
   const bool base = follower.has_base();
   request.epoch(base ? *follower.replica().epoch() : 0);
   request.version(base ? follower.replica().version() : 0);
-  requests.write(request);
+  bus->requests.write(request);
   ++asked;
 }
 
@@ -324,7 +368,8 @@ MirrorStatus MapMirror::Impl::status_now() const {
   status.objects = objects.count(followed());
   status.publisher_present = publishers.present();
   status.publisher_seen = publishers.followed().has_value();
-  const std::vector<std::uint64_t> rivals = publishers.rivals(Clock::now());
+  const auto now = Clock::now();
+  const std::vector<std::uint64_t> rivals = publishers.rivals(now);
   status.publishers = rivals.size() + status.publisher_present;
   const bool ended =
       manifest && manifest->final_version() && manifest->version() == replica.version();
@@ -332,11 +377,16 @@ MirrorStatus MapMirror::Impl::status_now() const {
   status.failures = thread.failures();
   status.last_failure = thread.last_failure();
   status.stale_because = follower.stale_because();
-  if (!manifest && !manifests.misread_from().empty()) {
-    status.stale_because = std::string(manifests.topic()) + ": " + manifests.misread_from();
+  if (!manifest && !bus->manifests.misread_from().empty()) {
+    status.stale_because =
+        std::string(bus->manifests.topic()) + ": " + bus->manifests.misread_from();
   }
   if (status.stale_because.empty() && !ended && !status.publisher_present) {
     status.stale_because = "the publisher has gone without ending its run";
+  }
+  if (status.stale_because.empty() && publishers.silence(now) >= dds::Publishers::kQuiet) {
+    status.stale_because = "nothing was heard of the publisher for " +
+                           std::to_string(dds::Publishers::kQuiet.count()) + " s";
   }
   if (!rivals.empty()) status.stale_because = conflict(options.map_id, status.epoch, rivals);
   status.in_step = status.stale_because.empty();

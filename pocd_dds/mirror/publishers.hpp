@@ -22,6 +22,8 @@ class Publishers {
   /// Manifests come every second.
   static constexpr std::chrono::milliseconds kSilence{3000};
   static constexpr std::chrono::milliseconds kMeeting{1000};
+  /// One that is there and says nothing for so long hangs, or is not heard.
+  static constexpr std::chrono::seconds kQuiet{10};
 
   /// A manifest has come. True: it is of the one that is followed, perhaps from now on.
   bool heard(const Writer& writer, std::uint64_t epoch, bool final_version, Time now) {
@@ -31,6 +33,8 @@ class Publishers {
     claim.heard = now;
     if (followed_ != epoch && followed_ && claims(*followed_, now)) return false;
     followed_ = epoch;
+    ended_ = final_version;
+    heard_ = now;
     return true;
   }
   /// Forgets whose writer has gone; `present` says whether one is there. The bus may tell of a
@@ -53,6 +57,10 @@ class Publishers {
       if (claim.epoch == followed_) return true;
     }
     return false;
+  }
+  /// For how long nothing has come of the one that is followed; zero when it has ended its run.
+  std::chrono::steady_clock::duration silence(Time now) const {
+    return followed_ && !ended_ ? now - heard_ : std::chrono::steady_clock::duration::zero();
   }
   /// Runs beside the one that is followed, which is there, too.
   std::vector<std::uint64_t> rivals(Time now) const {
@@ -87,6 +95,8 @@ class Publishers {
 
   std::map<Writer, Claim> claims_;
   std::optional<std::uint64_t> followed_;
+  bool ended_ = false;  // the one that is followed
+  Time heard_{};        // the same
 };
 
 }  // namespace pocd::dds

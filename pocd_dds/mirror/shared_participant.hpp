@@ -9,7 +9,9 @@
 namespace pocd::dds {
 
 /// Those of one process that ask for the same share it: a participant costs far more than its
-/// readers. Thread-safe.
-std::shared_ptr<Participant> shared_participant(const BusOptions& options);
+/// readers. `instead_of` is not shared any more: who is deaf with it gets another one, and so do
+/// all that ask from then on. Thread-safe.
+std::shared_ptr<Participant> shared_participant(
+    const BusOptions& options, const std::shared_ptr<Participant>& instead_of = nullptr);
 
 }  // namespace pocd::dds

@@ -86,7 +86,9 @@ until ((SECONDS >= 60 * minutes)); do
   # Every ten seconds something happens; what, the number of the round decides, so that two runs are alike.
   pair=$((round / 4 % 4))
   if ((round % 4 == 0)); then # robots, who drive for some 40 s unless they die
-    start "pair$pair" pocd_play --dataset sim --input "$output/pair$pair.yaml" --no-color
+    # Not beside themselves: on a machine with much to do they would become more and more.
+    [[ -n ${pids[pair$pair]:-} ]] && alive "pair$pair" ||
+      start "pair$pair" pocd_play --dataset sim --input "$output/pair$pair.yaml" --no-color
     [[ -n ${pids[dock_robots]:-} ]] && alive dock_robots ||
       start dock_robots pocd_play --dataset sim --input "$output/dock.yaml" --no-color --max-frames 200
   fi

@@ -72,6 +72,24 @@ TEST_F(PublishersTest, OneThatHasGoneOrEndedIsReplacedAtOnce) {
   EXPECT_TRUE(publishers.rivals(now).empty());
 }
 
+// A node whose threads of the middleware live while its own hang, or one that has been killed.
+TEST_F(PublishersTest, SilenceIsThatOfTheOneThatIsFollowedUntilItsRunHasEnded) {
+  EXPECT_EQ(publishers.silence(now), seconds(0)) << "nobody is followed";
+  heard(kA, 1);
+  now += seconds(2);
+  heard(kB, 2);
+  EXPECT_EQ(publishers.silence(now), seconds(2));
+  publishers.forget_gone([](const Writer&) { return true; }, now);
+  publishers.forget_gone([](const Writer&) { return false; }, now);
+  now += seconds(60);
+  EXPECT_EQ(publishers.silence(now), seconds(62)) << "gone without a word";
+  heard(kA, 1);
+  EXPECT_EQ(publishers.silence(now), seconds(0));
+  heard(kA, 1, true);
+  now += seconds(60);
+  EXPECT_EQ(publishers.silence(now), seconds(0)) << "its run has ended";
+}
+
 TEST_F(PublishersTest, AWriterMayGoOnWithAnotherRun) {
   heard(kA, 1);  // a recording of two runs, played by one writer
   EXPECT_TRUE(heard(kA, 2));
