@@ -28,6 +28,10 @@ class Client {
     this.wanted = "";
     this.socket = new WebSocket(`ws://127.0.0.1:${port}/live`, ["pocd.view.v1"]);
     this.socket.on("message", (data) => this.use(data));
+    this.socket.on("close", () => {
+      console.error("pocd_view has ended the connection");
+      process.exit(1);
+    });
     this.wishing = setInterval(() => this.wish(), 250);
   }
   use(data) {
