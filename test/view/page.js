@@ -19,6 +19,7 @@ main(async () => {
   const open = async (width, height, more = {}) => {
     const page = await browser.newPage();
     await page.setViewport({ width, height, ...more });
+    page.setDefaultTimeout(120000);
     page.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
     page.on("pageerror", (error) => errors.push(String(error)));
     page.on("request", (request) => { if (!request.url().startsWith(server.address) && !/^(data|blob):/.test(request.url())) elsewhere.push(request.url()); });
@@ -108,12 +109,21 @@ main(async () => {
   await page.keyboard.press("t");
   await holds("the camera is above", () => window.pocd.stage.top && !window.pocd.stage.flight);
   await page.keyboard.press("m");
+  // Two places where there is a surface, far apart.
   const ends = await page.evaluate(() => {
-    const rect = document.querySelector("#canvas").getBoundingClientRect();
-    return [[-1, 0.9, 0], [1, 0.9, 0]].map((at) => { const p = window.pocd.stage.project(at); return [rect.left + p.x, rect.top + p.y]; });
+    const { stage, surface } = window.pocd, rect = document.querySelector("#canvas").getBoundingClientRect(), hits = [];
+    for (let i = 2; i < 38; ++i) {
+      for (let k = 2; k < 30; ++k) {
+        const x = rect.left + rect.width * i / 40, y = rect.top + rect.height * k / 32, point = surface.hit(stage.rayAt(x, y).raycaster);
+        if (point && document.elementFromPoint(x, y).id === "canvas") hits.push({ x, y, at: point.toArray() });
+      }
+    }
+    return [hits[0], hits.at(-1)];
   });
-  for (const [x, y] of ends) await page.mouse.click(x, y);
-  await holds("a length is measured", () => [...document.querySelectorAll("#labels .measure")].some((label) => { const level = /level ([0-9.]+) m/.exec(label.textContent); return level && Math.abs(Number(level[1]) - 2) < 0.25; }));
+  for (const { x, y } of ends) await page.mouse.click(x, y);
+  const across = Math.hypot(ends[0].at[0] - ends[1].at[0], ends[0].at[1] - ends[1].at[1]);
+  check(across > 3, `two surfaces are ${across} m apart`);
+  await holds("a length is measured", (length) => [...document.querySelectorAll("#labels .measure")].some((label) => { const level = /level ([0-9.]+) m/.exec(label.textContent); return level && Math.abs(Number(level[1]) - length) < 0.1; }), across);
   await shot("measured");
   await page.keyboard.press("m");
   await page.keyboard.press("t");
@@ -131,6 +141,7 @@ main(async () => {
   });
   check(/sel=[0-9a-f]{32}/.test(link), "the address holds the selection");
   const linked = await browser.newPage();
+  linked.setDefaultTimeout(120000);
   await linked.goto(link);
   await until(() => linked.evaluate(() => window.pocd?.panel.selected), "a link restores the selection");
   const cameras = await Promise.all([page, linked].map((one) => one.evaluate(() => window.pocd.stage.camera.position.toArray())));

@@ -74,6 +74,7 @@ main(async () => {
   page.on("console", (message) => { if (["warn", "warning", "error"].includes(message.type())) complaints.push(message.text()); });
   page.on("pageerror", (error) => complaints.push(String(error)));
   await page.setViewport({ width: 1280, height: 800 });
+  page.setDefaultTimeout(300000);
   await page.goto(await serve());
   await until(() => page.evaluate(() => window.rerun?.opened || window.rerun?.problem), "Rerun opens the recording", 300000);
   check(await page.evaluate(() => window.rerun.problem) === null, "Rerun reads it");
