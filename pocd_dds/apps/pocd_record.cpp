@@ -68,6 +68,9 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--exclude", options.exclude, "Pattern of topics to leave out; repeat it")
       ->allow_extra_args(false);
+  app.add_flag("--rerun", options.rerun,
+               "Also what Rerun's viewer shows: colours of clouds, boxes of markers, poses of "
+               "odometry; clouds get a field \"colors\", the rest topics of its own, TOPIC/rerun");
   app.add_option("--compression", compression, "Of the chunks")
       ->check(CLI::IsMember({"none", "lz4", "zstd"}))
       ->capture_default_str();

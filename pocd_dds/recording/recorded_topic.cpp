@@ -142,7 +142,9 @@ std::map<std::string, std::string> metadata_of(const RecordedTopic& topic) {
 }
 
 std::optional<RecordedTopic> topic_of(const RecordedChannel& channel) {
-  if (channel.message_encoding != "cdr") return std::nullopt;
+  if (channel.message_encoding != "cdr" || !metadata(channel, kMadeOf).empty()) {
+    return std::nullopt;
+  }
   RecordedTopic topic;
   read_qos(channel, topic);
   topic.partitions = read_partitions(metadata(channel, "partitions"));

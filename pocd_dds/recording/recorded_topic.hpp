@@ -32,8 +32,11 @@ std::string recorded_name(const std::string& dds_topic);
 recording::SchemaText schema_of(const RecordedTopic& topic);
 std::map<std::string, std::string> metadata_of(const RecordedTopic& topic);
 
+/// In the metadata of a channel that the recorder has made of another one, whose name it is: it was
+/// on no bus and is not played.
+inline constexpr const char* kMadeOf = "made_of";
 /// The topic of a channel, by what this program, eProsima's recorder or rosbag2 wrote. Nothing for
-/// a channel that is not cdr.
+/// a channel that is not cdr or was made of another one.
 std::optional<RecordedTopic> topic_of(const recording::RecordedChannel& channel);
 
 /// Changes of a keyed topic's instances have a channel of their own (pocd_msgs InstanceChange).

@@ -18,6 +18,7 @@
 #include "pocd_dds/recording/discovery.hpp"
 #include "pocd_dds/recording/latched_samples.hpp"
 #include "pocd_dds/recording/record_queue.hpp"
+#include "pocd_dds/recording/rerun_form.hpp"
 
 namespace pocd::dds {
 
@@ -169,6 +170,9 @@ struct Recorder::Impl {
   void consider(const RecordedTopic& topic);
   std::uint16_t add_channel(const recording::SchemaText& schema, const std::string& name,
                             const std::map<std::string, std::string>& metadata);
+  void add_rerun_form(const RecordedTopic& topic, std::uint16_t channel,
+                      const std::map<std::string, std::string>& metadata);
+  void write_for_rerun(QueuedSample& sample);
   void open_reader(Line& line);
   static void close_reader(Line& line);
   void close_readers();
@@ -182,6 +186,11 @@ struct Recorder::Impl {
   mutable std::mutex writer_mutex;
   recording::SplitWriter writer;
   std::map<std::string, std::uint16_t> schemas;
+  struct Converted {
+    RerunForm form;
+    std::optional<std::uint16_t> channel;  // of a second topic
+  };
+  std::map<std::uint16_t, Converted> converted;  // by channel; guarded as the writer is
   std::exception_ptr failure;
   std::atomic<bool> failed{false};
 
@@ -236,6 +245,7 @@ void Recorder::Impl::consider(const RecordedTopic& topic) {
         instances_schema(), instances_name(topic),
         {{"instances_of", recorded_name(topic.name)}, {"partitions", metadata.at("partitions")}});
   }
+  if (options.rerun) add_rerun_form(topic, line.channel, metadata);
   open_reader(line);
   spdlog::info("recording {} ({})", recorded_name(topic.name), plain_type(topic.type));
 }
@@ -250,6 +260,35 @@ std::uint16_t Recorder::Impl::add_channel(const recording::SchemaText& schema,
                                : writer.add_schema(schema.name, schema.encoding, schema.text);
   schemas[schema.name] = id;
   return writer.add_channel(id, name, "cdr", metadata);
+}
+
+void Recorder::Impl::add_rerun_form(const RecordedTopic& topic, std::uint16_t channel,
+                                    const std::map<std::string, std::string>& metadata) {
+  std::optional<RerunForm> form = RerunForm::of(topic);
+  if (!form) return;
+  std::optional<std::uint16_t> second;
+  if (const auto schema = form->second()) {
+    second = add_channel(
+        *schema, RerunForm::second_name(topic),
+        {{kMadeOf, recorded_name(topic.name)}, {"partitions", metadata.at("partitions")}});
+  }
+  const std::lock_guard<std::mutex> lock(writer_mutex);
+  converted.emplace(channel, Converted{std::move(*form), second});
+}
+
+/// Changes the sample, or writes another one beside it.
+void Recorder::Impl::write_for_rerun(QueuedSample& sample) {
+  const auto found = converted.find(sample.header.channel);
+  if (found == converted.end()) return;
+  std::optional<recording::Bytes> made = found->second.form.convert(sample.payload);
+  if (!made) return;
+  if (!found->second.channel) {
+    sample.payload = std::move(*made);
+    return;
+  }
+  recording::MessageHeader header = sample.header;
+  header.channel = *found->second.channel;
+  writer.write(header, made->data(), made->size());
 }
 
 void Recorder::Impl::open_reader(Line& line) {
@@ -318,6 +357,7 @@ void Recorder::Impl::write_all() {
       std::optional<QueuedSample> sample = queue.pop(std::chrono::milliseconds(100));
       const std::lock_guard<std::mutex> lock(writer_mutex);
       if (sample) {
+        if (!converted.empty()) write_for_rerun(*sample);
         writer.write(sample->header, sample->payload.data(), sample->payload.size());
         latched.note(*sample);
         queue.give_back(std::move(sample->payload));

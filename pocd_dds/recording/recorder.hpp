@@ -18,6 +18,7 @@ struct RecorderOptions {
   std::vector<std::string> exclude;
   recording::SplitOptions split;
   bool overwrite = false;
+  bool rerun = false;                    ///< also what Rerun's viewer takes, see RerunForm
   std::size_t queue_bytes = 512u << 20;  ///< received and not written yet; beyond it samples drop
   double flush_period_s = 1.0;           ///< what is older has reached the file
 };

@@ -1,5 +1,6 @@
 #include "view/foxglove_session.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pocd/common/check.hpp"
@@ -8,6 +9,8 @@ namespace pocd::view {
 namespace {
 
 constexpr char kNoMessage[] = "a message that is none of this protocol";
+constexpr std::chrono::milliseconds kLookPeriod{100};  // of what is played
+constexpr int kRest = 10;  // times as long as a look took: it is the thread of all clients
 
 /// A channel in JSON: notices of the board whose key begins with the prefix.
 struct JsonChannel {
@@ -33,15 +36,16 @@ void put(std::string& out, std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) out.push_back(static_cast<char>(value >> (8 * i)));
 }
 
-std::uint64_t nanoseconds(double stamp_s) {
-  return stamp_s > 0.0 ? static_cast<std::uint64_t>(std::llround(stamp_s * 1e9)) : 0;
+/// As the protocol has it: never negative.
+std::uint64_t unsigned_ns(StampNs stamp_ns) {
+  return static_cast<std::uint64_t>(std::max<StampNs>(stamp_ns, 0));
 }
 
 /// The stamp of what a notice says, where it has one.
-double stamp_of(const std::string& notice, double otherwise) {
+StampNs stamp_of(const std::string& notice, StampNs otherwise) {
   const Json json = Json::parse(notice, nullptr, false);
   for (const char* field : {"stamp", "last_seen"}) {
-    if (json.is_object() && json.contains(field)) return json[field].get<double>();
+    if (json.is_object() && json.contains(field)) return stamp_from(json[field].get<double>());
   }
   return otherwise;
 }
@@ -51,7 +55,13 @@ std::optional<std::uint32_t> id_from(const Json& json) {
   return static_cast<std::uint32_t>(json.get<std::uint64_t>());
 }
 
-Json channels(const Relay& relay) {
+/// As the protocol has it in texts, whose numbers are doubles.
+Json time_json(StampNs stamp_ns) {
+  const std::uint64_t ns = unsigned_ns(stamp_ns);
+  return {{"sec", ns / 1000000000}, {"nsec", ns % 1000000000}};
+}
+
+Json channels(const Relay* relay) {
   Json list = Json::array();
   for (std::uint64_t i = 0; i < kJsonCount; ++i) {
     const JsonChannel& channel = kJsonChannels[i];
@@ -63,8 +73,8 @@ Json channels(const Relay& relay) {
                     {"schema", std::string(R"({"type":"object","properties":{)") +
                                    channel.properties + "}}"}});
   }
-  for (std::size_t i = 0; i < relay.topics().size(); ++i) {
-    const RelayedTopic& topic = relay.topics()[i];
+  for (std::size_t i = 0; relay != nullptr && i < relay->topics().size(); ++i) {
+    const RelayedTopic& topic = relay->topics()[i];
     list.push_back({{"id", kJsonCount + i + 1},
                     {"topic", dds::recorded_name(topic.topic.name)},
                     {"encoding", "cdr"},
@@ -83,15 +93,29 @@ FoxgloveSession::~FoxgloveSession() {
   }
 }
 
-void FoxgloveSession::opened() {
+/// Of what is played the range has to be known first: it is read when this is true.
+bool FoxgloveSession::greet() {
   const Json state = Json::parse(board_.notice("status"), nullptr, false);
-  say({{"op", "serverInfo"},
-       {"name", "pocd_view"},
-       {"capabilities", {"time", "parameters"}},
-       {"supportedEncodings", Json::array()},
-       {"metadata", {{"program", "pocd_view"}}},
-       {"sessionId", state.is_object() ? state.value("epoch", "") : ""}});
-  say({{"op", "advertise"}, {"channels", channels(relay_)}});
+  played_ = state.is_object() && state.contains("played");
+  if (played_ && state["played"]["read"].get<double>() < 1.0) return false;
+  greeted_ = true;
+  Json info = {{"op", "serverInfo"},
+               {"name", "pocd_view"},
+               {"capabilities", {"time", "parameters"}},
+               {"supportedEncodings", Json::array()},
+               {"metadata", {{"program", "pocd_view"}}},
+               {"sessionId", state.is_object() ? state.value("epoch", "") : ""}};
+  if (played_ && knows_playback_ && source_ != nullptr && state.contains("time")) {
+    clock_.emplace(stamp_from(state["time"][0].get<double>()),
+                   stamp_from(state["time"][1].get<double>()));
+    info["capabilities"].push_back("playbackControl");
+    info["dataStartTime"] = time_json(clock_->first_ns());
+    info["dataEndTime"] = time_json(clock_->last_ns());
+  }
+  say(info);
+  say({{"op", "advertise"}, {"channels", channels(played_ ? nullptr : &relay_)}});
+  if (clock_) say(clock_->state(std::chrono::steady_clock::now()));
+  return true;
 }
 
 void FoxgloveSession::status(int level, const std::string& text) {
@@ -99,8 +123,9 @@ void FoxgloveSession::status(int level, const std::string& text) {
 }
 
 std::string FoxgloveSession::received(const std::string& message, bool binary) {
-  if (texts_.size() >= kMostTexts) return "questions whose answers are not read";
+  if (answers_.size() >= kMostAnswers) return "questions whose answers are not read";
   if (binary) {
+    if (!message.empty() && message[0] == kPlaybackRequestOpcode) return control(message);
     status(2, "clients cannot publish");
     return "";
   }
@@ -127,7 +152,7 @@ std::string FoxgloveSession::subscribe(const Json& message) {
     if (!wish.is_object() || !wish.contains("id") || !wish.contains("channelId")) return kNoMessage;
     const auto id = id_from(wish["id"]), channel = id_from(wish["channelId"]);
     if (!id || !channel) return kNoMessage;
-    if (*channel == 0 || *channel > kJsonCount + relay_.topics().size()) {
+    if (*channel == 0 || *channel > kJsonCount + (played_ ? 0 : relay_.topics().size())) {
       status(2, "there is no channel " + std::to_string(*channel));
       continue;
     }
@@ -188,25 +213,115 @@ Json FoxgloveSession::parameters(const Json& message) const {
   return values;
 }
 
-double FoxgloveSession::data_time() const {
+bool FoxgloveSession::busy() const { return clock_ && (clock_->playing() || sought_); }
+
+std::string FoxgloveSession::control(const std::string& message) {
+  const auto request = playback_request_from(message);
+  if (!request) return kNoMessage;
+  if (!clock_) {
+    status(2, "there is nothing to play");
+    return "";
+  }
+  PlaybackState state;
+  if (!clock_->apply(*request, std::chrono::steady_clock::now(), state)) {
+    status(2, "a speed of playing has to be above 0, up to 1000");
+  } else {
+    sought_ = sought_ || state.did_seek || !controlled_;
+    controlled_ = true;
+    told_end_ = state.status == PlaybackStatus::kEnded;
+  }
+  say(state);
+  return "";
+}
+
+/// Brings what the viewer is shown to its time.
+void FoxgloveSession::play_on() {
+  if (!controlled_) return;
+  const auto start = std::chrono::steady_clock::now();
+  const PlaybackState state = clock_->state(start);
+  const bool ended = state.status == PlaybackStatus::kEnded;
+  if (ended && !told_end_) say(state);
+  told_end_ = ended;
+  if (start < next_look_ && !(ended && !sought_)) return;
+  if (!sought_ && state.time_ns == shown_ns_) return;
+  if (sought_) {
+    shown_ = {};
+    for (auto& [id, subscription] : subscriptions_) subscription.read = 0;
+  }
+  show_objects(state.time_ns);
+  show_events(state.time_ns, sought_);
+  shown_ns_ = state.time_ns;
+  sought_ = false;
+  const auto took = std::chrono::steady_clock::now() - start;
+  next_look_ = start + std::max<std::chrono::steady_clock::duration>(kLookPeriod, kRest * took);
+}
+
+void FoxgloveSession::show_objects(StampNs stamp_ns) {
+  const Json then = Json::parse(source_->then(seconds(stamp_ns)), nullptr, false);
+  std::map<std::string, std::string> now;
+  for (const Json& one : then.at("objects")) {
+    Json object = one;
+    object["type"] = "object";
+    object["condition"] = "present";
+    object["last_seen"] = one.at("stamp");
+    now["object/" + one.at("id").get<std::string>()] = text_of(object);
+  }
+  for (const auto& [key, json] : there_) {
+    if (now.count(key) > 0) continue;
+    Json object = Json::parse(json);
+    object["condition"] = "gone";
+    shown_.put(key, {stamp_ns, text_of(object)});
+  }
+  for (const auto& [key, json] : now) {
+    const auto before = there_.find(key);
+    if (sought_ || before == there_.end() || before->second != json) {
+      shown_.put(key, {stamp_ns, json});
+    }
+  }
+  there_ = std::move(now);
+}
+
+/// Those between the time shown before and this one; after a seek the last one before.
+void FoxgloveSession::show_events(StampNs stamp_ns, bool sought) {
+  if (past_.empty()) {
+    std::uint64_t read = 0;
+    for (const auto& [key, json] : board_.notices_after(read, "event/", ~std::size_t{0})) {
+      past_.emplace_back(stamp_of(json, 0), key);
+    }
+    std::stable_sort(past_.begin(), past_.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+  }
+  const auto after = [&](StampNs stamp) {
+    return std::upper_bound(past_.begin(), past_.end(), stamp,
+                            [](StampNs s, const auto& event) { return s < event.first; });
+  };
+  const auto end = after(stamp_ns);
+  auto from = sought ? (end == past_.begin() ? end : std::prev(end)) : after(*shown_ns_);
+  for (; from < end; ++from) shown_.put(from->second, {from->first, board_.notice(from->second)});
+}
+
+StampNs FoxgloveSession::data_time() const {
+  if (shown_ns_) return *shown_ns_;
   const Json state = Json::parse(board_.notice("status"), nullptr, false);
-  if (!state.is_object() || !state.contains("time")) return 0.0;
-  return state["time"][1].get<double>();
+  if (!state.is_object() || !state.contains("time")) return 0;
+  return stamp_from(state["time"][1].get<double>());
 }
 
 std::optional<WebSession::Outgoing> FoxgloveSession::next_time() {
-  const double now_s = data_time();
-  if (now_s == told_time_) return std::nullopt;
-  told_time_ = now_s;
+  const StampNs now_ns = data_time();
+  if (now_ns == told_ns_) return std::nullopt;
+  told_ns_ = now_ns;
   Outgoing out{std::string(1, '\x02'), true};
-  put(out.data, nanoseconds(now_s), 8);
+  put(out.data, unsigned_ns(now_ns), 8);
   return out;
 }
 
 std::optional<WebSession::Outgoing> FoxgloveSession::next() {
-  if (!texts_.empty()) {
-    Outgoing out{std::move(texts_.front()), false};
-    texts_.pop_front();
+  if (!greeted_ && !greet()) return std::nullopt;
+  play_on();
+  if (!answers_.empty()) {
+    Outgoing out = std::move(answers_.front());
+    answers_.pop_front();
     return out;
   }
   if (auto time = next_time()) return time;
@@ -235,15 +350,26 @@ std::optional<WebSession::Outgoing> FoxgloveSession::next_of(std::uint32_t id,
       status(1, "too slow for " + relay_.topics()[index].topic.name + ": samples were left out");
     }
     subscription.read = sample.number;
-    put(out.data, nanoseconds(told_time_), 8);
+    put(out.data, unsigned_ns(told_ns_), 8);
     out.data.append(reinterpret_cast<const char*>(sample.payload->data()), sample.payload->size());
     return out;
   }
   const std::string prefix = kJsonChannels[subscription.channel - 1].prefix;
+  if (controlled_ && (prefix == "object/" || prefix == "event/")) {
+    while (true) {
+      const auto [key, entry] = shown_.after(subscription.read);
+      if (entry == nullptr) return std::nullopt;
+      subscription.read = entry->revision;
+      if (key->compare(0, prefix.size(), prefix) != 0) continue;
+      put(out.data, unsigned_ns(entry->value.stamp_ns), 8);
+      out.data += entry->value.json;
+      return out;
+    }
+  }
   // One at a time is taken, so that what follows is the newest when it is its turn.
   const auto found = board_.notices_after(subscription.read, prefix, 1);
   if (found.empty()) return std::nullopt;
-  put(out.data, nanoseconds(stamp_of(found.front().second, told_time_)), 8);
+  put(out.data, unsigned_ns(stamp_of(found.front().second, told_ns_)), 8);
   out.data += found.front().second;
   return out;
 }

@@ -235,7 +235,7 @@ std::shared_ptr<WebSession> Server::Impl::session_of(beast::tcp_stream&& stream,
   if (subprotocol == PageSession::kSubprotocol) {
     return std::make_shared<PageSession>(std::move(stream), board, source);
   }
-  return std::make_shared<FoxgloveSession>(std::move(stream), board, relay);
+  return std::make_shared<FoxgloveSession>(std::move(stream), board, relay, source, subprotocol);
 }
 
 void Server::Impl::wake() {

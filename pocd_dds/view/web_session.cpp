@@ -15,10 +15,12 @@ namespace {
 
 // What is on its way in the kernel is out of date when it arrives: little of it.
 constexpr int kSendBuffer = 256 * 1024;
+constexpr std::chrono::milliseconds kBusyPeriod{50};
 
 }  // namespace
 
-WebSession::WebSession(beast::tcp_stream&& stream) : socket_(std::move(stream)) {
+WebSession::WebSession(beast::tcp_stream&& stream)
+    : socket_(std::move(stream)), timer_(socket_.get_executor()) {
   auto& tcp = beast::get_lowest_layer(socket_).socket();
   error_code ignored;
   tcp.set_option(boost::asio::socket_base::send_buffer_size(kSendBuffer), ignored);
@@ -52,7 +54,6 @@ void WebSession::accept(const Request& request, const std::string& subprotocol) 
     if (error) return;
     self->open_ = true;
     spdlog::info("{}: is here", self->peer_);
-    self->opened();
     self->read();
     self->pump();
   });
@@ -90,7 +91,10 @@ void WebSession::read() {
 void WebSession::pump() {
   if (!open_ || ending_ || writing_) return;
   writing_ = next();
-  if (!writing_) return;
+  if (!writing_) {
+    if (busy()) pump_later();
+    return;
+  }
   socket_.binary(writing_->binary);
   socket_.async_write(boost::asio::buffer(writing_->data),
                       [self = shared_from_this()](error_code error, std::size_t bytes) {
@@ -102,6 +106,18 @@ void WebSession::pump() {
                         }
                         self->pump();
                       });
+}
+
+void WebSession::pump_later() {
+  if (timer_set_) return;
+  timer_set_ = true;
+  timer_.expires_after(kBusyPeriod);
+  timer_.async_wait([weak = weak_from_this()](error_code) {
+    const auto self = weak.lock();
+    if (!self) return;
+    self->timer_set_ = false;
+    self->pump();
+  });
 }
 
 void WebSession::end(const std::string& reason) {

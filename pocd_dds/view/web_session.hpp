@@ -39,19 +39,22 @@ class WebSession : public std::enable_shared_from_this<WebSession> {
     std::string data;
     bool binary = false;
   };
-  virtual void opened() {}
   /// An empty text: goes on. Else the client has sent something wrong, and is told so and ended.
   virtual std::string received(const std::string& message, bool binary) = 0;
   virtual std::optional<Outgoing> next() = 0;
+  /// It will have something to send soon without being pumped from outside.
+  virtual bool busy() const { return false; }
 
  private:
   void read();
+  void pump_later();
   bool within_rate();
 
   boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;
   boost::beast::flat_buffer buffer_;
   std::optional<Outgoing> writing_;
-  bool open_ = false, ending_ = false;
+  boost::asio::steady_timer timer_;
+  bool open_ = false, ending_ = false, timer_set_ = false;
   double allowance_ = kMostAtOnce;
   std::chrono::steady_clock::time_point counted_ = std::chrono::steady_clock::now();
   std::uint64_t bytes_sent_ = 0;

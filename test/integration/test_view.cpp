@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <thread>
 
@@ -55,6 +56,15 @@ class Client {
     while (receive()) {
     }
     return read_;
+  }
+  /// The server has ended it, whatever it has sent before.
+  bool closes() {
+    while (true) {
+      pollfd ready{socket_, POLLIN, 0};
+      if (::poll(&ready, 1, kGenerous_ms) <= 0) return false;
+      char bytes[4096];
+      if (::recv(socket_, bytes, sizeof bytes, 0) <= 0) return true;
+    }
   }
   std::string& read() { return read_; }
 
@@ -142,11 +152,39 @@ class Page : public Client {
   }
 };
 
+/// A recording of ten seconds: object "a" is there from the start on and changes every second, "b"
+/// from 103.5 s to 107.5 s.
+class TenSeconds : public Source {
+ public:
+  explicit TenSeconds(Board& board) : board_(board) {
+    for (int i = 0; i < 10; ++i) {
+      board.put_notice(
+          "event/" + std::to_string(i),
+          "{\"event\":" + std::to_string(i) + ",\"stamp\":" + std::to_string(100 + i) + ".25}");
+    }
+    read(1.0);
+  }
+  void read(double share) const {
+    board_.put_notice("status", "{\"type\":\"status\",\"time\":[100,110],\"played\":{\"read\":" +
+                                    std::to_string(share) + "}}");
+  }
+  std::optional<std::string> history(const std::string&) const override { return std::nullopt; }
+  std::string then(double stamp_s) const override {
+    const int second = static_cast<int>(std::floor(stamp_s));
+    std::string text = "{\"objects\":[{\"id\":\"a\",\"stamp\":" + std::to_string(second) + "}";
+    if (stamp_s >= 103.5 && stamp_s < 107.5) text += ",{\"id\":\"b\",\"stamp\":103.5}";
+    return text + "],\"robots\":[]}";
+  }
+
+ private:
+  Board& board_;
+};
+
 class ViewServer : public ::testing::Test {
  protected:
-  void start(ServerOptions options = {}) {
+  void start(ServerOptions options = {}, const Source* source = nullptr) {
     options.port = 0;
-    server = std::make_unique<Server>(options, files(), board, nullptr, relay);
+    server = std::make_unique<Server>(options, files(), board, source, relay);
     port = server->port();
   }
   const StaticFiles& files() {
@@ -329,6 +367,8 @@ TEST_F(ViewServer, SurvivesWhatIsNoProtocol) {
           client.send(noise(200));
         } else if (random.uniform() < 0.3) {
           client.send(frame(noise(200), static_cast<int>(random.below(16))));
+        } else if (random.uniform() < 0.2) {
+          client.send(frame('\3' + noise(40), 2));  // as if it asked to play
         } else {
           client.send(frame(words[random.below(std::size(words))] +
                             values[random.below(std::size(values))]));
@@ -350,6 +390,229 @@ TEST_F(ViewServer, AClientThatDoesNotReadHoldsUpNobody) {
                      "{\"text\":\"" + std::string(100000, 'x') + "\"}");
   }
   expect_alive("while_deaf");
+}
+
+std::string little_endian(std::uint64_t value, int size) {
+  std::string out;
+  for (int i = 0; i < size; ++i) out.push_back(static_cast<char>(value >> (8 * i)));
+  return out;
+}
+
+/// A request of playbackControl.
+std::string control(bool play, float speed, std::optional<double> seek_s, const std::string& id) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &speed, 4);
+  const auto seek_ns = static_cast<std::uint64_t>(seek_s.value_or(0.0) * 1e9);
+  return frame(little_endian(3, 1) + little_endian(play ? 0 : 1, 1) + little_endian(bits, 4) +
+                   little_endian(seek_s ? 1 : 0, 1) + little_endian(seek_ns, 8) +
+                   little_endian(id.size(), 4) + id,
+               2);
+}
+
+/// A viewer of what is played, with what it has been told.
+class Player : public Page {
+ public:
+  explicit Player(std::uint16_t port, const std::string& subprotocol = "foxglove.sdk.v1")
+      : Page(port, subprotocol) {
+    send(
+        frame("{\"op\":\"subscribe\",\"subscriptions\":[{\"id\":1,\"channelId\":1},"
+              "{\"id\":2,\"channelId\":2}]}"));
+  }
+  /// Reads on until it is so. False: the server ended it, or nothing came any more.
+  template <class Condition>
+  bool until(const Condition& condition, int time_ms = kGenerous_ms) {
+    while (!condition()) {
+      const std::string one = message(time_ms);
+      if (one.empty()) return false;
+      const auto number = [&](std::size_t at, int size) {
+        std::uint64_t value = 0;
+        std::memcpy(&value, one.data() + at, static_cast<std::size_t>(size));
+        return value;
+      };
+      if (one[0] == '{') texts += one;
+      if (one[0] == 2) time_s = 1e-9 * static_cast<double>(number(1, 8));
+      if (one[0] == 5) {
+        states.push_back({static_cast<int>(one[1]), 1e-9 * static_cast<double>(number(2, 8)),
+                          one[14] != 0, one.substr(19)});
+      }
+      if (one[0] == 1) {
+        auto& list = number(1, 4) == 1 ? objects : events;
+        list.emplace_back(1e-9 * static_cast<double>(number(5, 8)), one.substr(13));
+      }
+    }
+    return true;
+  }
+  bool answered(const std::string& id) {
+    return until([&] { return !states.empty() && states.back().id == id; });
+  }
+  struct State {
+    int status;
+    double time_s;
+    bool did_seek;
+    std::string id;
+  };
+  std::vector<State> states;
+  std::vector<std::pair<double, std::string>> objects, events;
+  double time_s = 0.0;
+  std::string texts;
+};
+
+TEST_F(ViewServer, AViewerPlaysARecording) {
+  const TenSeconds source(board);
+  start({}, &source);
+  Player viewer(port);
+  ASSERT_TRUE(viewer.until([&] { return viewer.events.size() == 10; })) << "first, all of it";
+  EXPECT_NE(viewer.texts.find("\"playbackControl\""), std::string::npos);
+  EXPECT_NE(viewer.texts.find("\"dataStartTime\":{\"nsec\":0,\"sec\":100}"), std::string::npos);
+  EXPECT_NE(viewer.texts.find("\"dataEndTime\":{\"nsec\":0,\"sec\":110}"), std::string::npos);
+  EXPECT_EQ(viewer.texts.find("\"cdr\""), std::string::npos) << "no topics of a bus beside it";
+  EXPECT_EQ(viewer.states.back().status, 3) << "it stands at the end";
+  EXPECT_EQ(viewer.states.back().time_s, 110.0);
+
+  // From the start, at five times the speed, to the end.
+  viewer.events.clear();
+  viewer.send(control(true, 5.0F, 100.0, "from the start"));
+  ASSERT_TRUE(viewer.answered("from the start"));
+  EXPECT_EQ(viewer.states.back().status, 0);
+  EXPECT_EQ(viewer.states.back().time_s, 100.0);
+  EXPECT_TRUE(viewer.states.back().did_seek);
+  ASSERT_TRUE(viewer.until([&] { return viewer.states.back().status == 3; }));
+  EXPECT_EQ(viewer.states.back().time_s, 110.0);
+  EXPECT_EQ(viewer.states.back().id, "");
+  ASSERT_TRUE(viewer.until([&] { return viewer.events.size() == 10 && viewer.time_s == 110.0; }));
+  for (std::size_t i = 0; i < 10; ++i) {
+    EXPECT_NEAR(viewer.events[i].first, 100.25 + static_cast<double>(i), 1e-6);
+  }
+  ASSERT_TRUE(
+      viewer.until([&] { return viewer.objects.back().second.find("110") != std::string::npos; }));
+  double last_s = 100.0;
+  int came = 0, gone = 0;
+  for (const auto& [stamp_s, json] : viewer.objects) {
+    EXPECT_GE(stamp_s, last_s);
+    last_s = stamp_s;
+    if (json.find("\"b\"") == std::string::npos) continue;
+    const bool present = json.find("present") != std::string::npos;
+    came += present ? 1 : 0;
+    gone += json.find("gone") != std::string::npos ? 1 : 0;
+    EXPECT_GE(stamp_s, present ? 103.5 : 107.5);
+  }
+  // On a machine that stands still for a second it may come and go unseen.
+  EXPECT_LE(came, 1);
+  EXPECT_EQ(gone, came);
+
+  // To a place in the middle, standing: what was there then, and the last event before.
+  viewer.objects.clear();
+  viewer.events.clear();
+  viewer.send(control(false, 1.0F, 105.5, "there"));
+  ASSERT_TRUE(viewer.answered("there"));
+  EXPECT_EQ(viewer.states.back().status, 1);
+  ASSERT_TRUE(
+      viewer.until([&] { return viewer.objects.size() == 2 && viewer.events.size() == 1; }));
+  EXPECT_NEAR(viewer.events[0].first, 105.25, 1e-6);
+  EXPECT_EQ(viewer.time_s, 105.5);
+  EXPECT_FALSE(viewer.until([] { return false; }, 300)) << "it stands";
+  EXPECT_TRUE(viewer.reason.empty());
+
+  // A speed that is none is answered, and changes nothing.
+  viewer.send(control(true, -1.0F, 101.0, "back"));
+  ASSERT_TRUE(viewer.answered("back"));
+  EXPECT_EQ(viewer.states.back().status, 1);
+  EXPECT_EQ(viewer.states.back().time_s, 105.5);
+  EXPECT_NE(viewer.texts.find("a speed of playing"), std::string::npos);
+}
+
+TEST_F(ViewServer, EachViewerPlaysForItself) {
+  const TenSeconds source(board);
+  start({}, &source);
+  Player one(port), other(port), older(port, "foxglove.websocket.v1");
+  one.send(control(false, 1.0F, 102.0, "one"));
+  other.send(control(false, 1.0F, 108.0, "other"));
+  ASSERT_TRUE(one.until([&] { return one.time_s == 102.0; }));
+  ASSERT_TRUE(other.until([&] { return other.time_s == 108.0; }));
+  // Who does not know of it gets the end, as it was, and an answer.
+  older.send(control(false, 1.0F, 102.0, "older"));
+  ASSERT_TRUE(
+      older.until([&] { return older.texts.find("nothing to play") != std::string::npos; }));
+  ASSERT_TRUE(older.until([&] { return older.events.size() == 10; }));
+  EXPECT_EQ(older.texts.find("playbackControl"), std::string::npos);
+  EXPECT_TRUE(older.states.empty());
+}
+
+TEST_F(ViewServer, OfWhatIsStillReadTheRangeIsNotToldYet) {
+  const TenSeconds source(board);
+  source.read(0.5);
+  start({}, &source);
+  Player viewer(port);
+  EXPECT_FALSE(viewer.until([&] { return !viewer.texts.empty(); }, 500));
+  source.read(1.0);
+  EXPECT_TRUE(viewer.until([&] { return viewer.texts.find("dataEndTime") != std::string::npos; }));
+}
+
+TEST_F(ViewServer, ADamagedRequestToPlayEndsItsClientOnly) {
+  const TenSeconds source(board);
+  start({}, &source);
+  Player bystander(port);
+  const std::string whole = control(true, 1.0F, 101.0, "id").substr(6);
+  for (const std::string& damaged :
+       {whole.substr(0, 1), whole.substr(0, 18), whole.substr(0, whole.size() - 1),
+        whole.substr(0, 1) + '\7' + whole.substr(2),
+        whole.substr(0, 15) + std::string(4, '\xff') + "id"}) {
+    Player player(port);
+    player.send(frame(damaged, 2));
+    EXPECT_NE(player.until_ended().find("none of this protocol"), std::string::npos);
+  }
+  // A flood of seeks, of one that reads nothing, and of one that reads.
+  Player deaf(port);
+  std::string many;
+  for (int i = 0; i < 300; ++i) many += control(true, 1000.0F, 100.0 + i % 10, "many");
+  deaf.send(many);
+  Player flood(port);
+  for (int i = 0; i < 10; ++i) flood.send(many);
+  EXPECT_FALSE(flood.until_ended().empty());
+  bystander.send(control(false, 1.0F, 104.0, "still here"));
+  EXPECT_TRUE(bystander.answered("still here"));
+  expect_alive("after_seeks");
+}
+
+// What the WebSocket layer answers by itself, or gathers, before a protocol of ours sees it.
+TEST_F(ViewServer, PingsAndPiecesOfMessagesEndNobodyElse) {
+  start();
+  Page pings(port), pieces(port), unmasked(port);
+  std::string many;
+  for (int i = 0; i < 20000; ++i) many += frame("are you there", 9);
+  std::thread flood([&] { pings.send(many); });  // none of the answers is read
+  expect_alive("while_pinged");
+  // A message in pieces without an end is as large as a message may be at most.
+  const std::string body(1000, 'x');
+  std::string piece = frame(body);
+  piece[0] = 1;  // more follows
+  pieces.send(piece);
+  piece[0] = 0;
+  for (int i = 0; i < 200; ++i) {
+    if (!pieces.send(piece)) break;
+  }
+  EXPECT_TRUE(pieces.closes());
+  std::string bare = frame("{\"ack\":0}");
+  bare[1] = static_cast<char>(bare[1] & 0x7F);
+  bare.erase(2, 4);
+  unmasked.send(bare);
+  EXPECT_TRUE(unmasked.closes());
+  expect_alive("after_pings");
+  server.reset();
+  flood.join();
+}
+
+// Connections that say nothing are let go, and until then others have room.
+TEST_F(ViewServer, WhoSaysNothingIsLetGo) {
+  start();
+  std::vector<std::unique_ptr<Client>> idle;
+  for (int i = 0; i < 60; ++i) {
+    idle.push_back(std::make_unique<Client>(port));
+    idle.back()->send(i % 2 == 0 ? "" : "GET / HTTP/1.1\r\nHost: local");
+  }
+  expect_alive("beside_the_idle");
+  EXPECT_EQ(get("GET / HTTP/1.1\r\n" + host()).substr(0, 15), "HTTP/1.1 200 OK");
+  for (const auto& one : idle) EXPECT_TRUE(one->closes());
 }
 
 TEST_F(ViewServer, SaysWhyItCannotListen) {

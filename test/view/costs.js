@@ -1,6 +1,7 @@
 // What clients of pocd_view cost: connects CLIENTS clients of the page's protocol at once and says how long each
 // takes to the first surface and to the whole map, the bytes that it gets, and the CPU of the server.
 // Usage: costs.js PORT PID_OF_SERVER CLIENTS SECONDS_AFTER
+//        costs.js PORT --until-drawn     ends when the server has drawn all of the map
 "use strict";
 const fs = require("fs");
 const zlib = require("zlib");
@@ -21,11 +22,16 @@ class Client {
   constructor() {
     this.start = Date.now();
     this.bytes = this.surfaces = this.tiles = 0;
+    this.status = null;
     this.first = this.last = null;
     this.chunks = new Map();
     this.wanted = "";
     this.socket = new WebSocket(`ws://127.0.0.1:${port}/live`, ["pocd.view.v1"]);
     this.socket.on("message", (data) => this.use(data));
+    this.socket.on("close", () => {
+      console.error("pocd_view has ended the connection");
+      process.exit(1);
+    });
     this.wishing = setInterval(() => this.wish(), 250);
   }
   use(data) {
@@ -33,6 +39,10 @@ class Client {
     const plain = zlib.inflateRawSync(data.subarray(4));
     for (let at = 0; at + 24 <= plain.length;) {
       const kind = plain.readUInt32LE(at), size = plain.readUInt32LE(at + 4);
+      if (kind === 1) {
+        const json = JSON.parse(plain.toString("utf8", at + 24, at + 24 + size));
+        if (json.type === "status") this.status = json;
+      }
       if (kind === 2 || kind === 3) {
         ++this.surfaces;
         this.tiles += kind === 2;
@@ -61,6 +71,12 @@ const range = (list, digits) => {
 };
 
 (async () => {
+  if (process.argv[3] === "--until-drawn") {
+    const one = new Client();
+    const done = ({ in_step, drawing, tiles, drawn }) => in_step && !drawing && tiles > 0 && drawn >= tiles;
+    while (!(one.status && done(one.status))) await wait(50);
+    process.exit(0);
+  }
   const before = cpu();
   const all = Array.from({ length: clients }, () => new Client());
   while (!all.every((one) => one.last && Date.now() - one.last > kQuiet_ms)) await wait(50);

@@ -9,6 +9,7 @@ const [chromium, address, picture] = process.argv.slice(2);
     args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage"] });
   const page = await browser.newPage();
   await page.setViewport({ width: 1280, height: 800 });
+  page.setDefaultTimeout(120000);
   await page.goto(address);
   await page.waitForFunction(() => window.pocd?.times.first, { timeout: 120000 });
   let bytes = -1;

@@ -19,6 +19,7 @@ main(async () => {
   const open = async (width, height, more = {}) => {
     const page = await browser.newPage();
     await page.setViewport({ width, height, ...more });
+    page.setDefaultTimeout(120000);
     page.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
     page.on("pageerror", (error) => errors.push(String(error)));
     page.on("request", (request) => { if (!request.url().startsWith(server.address) && !/^(data|blob):/.test(request.url())) elsewhere.push(request.url()); });
@@ -33,6 +34,24 @@ main(async () => {
     await of.screenshot({ path: path.join(folder, `${name}.png`) });
   };
   const holds = (what, condition, ...values) => until(() => page.evaluate(condition, ...values), what);
+  /** The share of the picture of the map that differs between two of them: of pixels by more than a person overlooks. */
+  const picture = async () => {
+    await new Promise((resolve) => setTimeout(resolve, 900));
+    return (await page.$("#stage")).screenshot({ encoding: "base64" });
+  };
+  const difference = (...pictures) => page.evaluate(async (pair) => {
+    const [a, b] = await Promise.all(pair.map(async (base64) => {
+      const image = new Image();
+      image.src = `data:image/png;base64,${base64}`;
+      await image.decode();
+      const canvas = new OffscreenCanvas(image.width, image.height).getContext("2d");
+      canvas.drawImage(image, 0, 0);
+      return canvas.getImageData(0, 0, image.width, image.height).data;
+    }));
+    let differ = 0;
+    for (let i = 0; i < a.length; i += 4) differ += [0, 1, 2].some((k) => Math.abs(a[i + k] - b[i + k]) > 24);
+    return a.length === b.length ? differ / (a.length / 4) : 1;
+  }, pictures);
 
   await until(async () => (await state()) === "no map yet", "a page without a map says so");
   await shot("waiting");
@@ -59,6 +78,57 @@ main(async () => {
   await page.keyboard.press("Home");
   await shot("after_the_run");
 
+  // The list filters by kind, class, time and place.
+  const listed = () => page.$$eval("#events button", (rows) => rows.map((row) => row.className.split(" ")[0]));
+  const all = await listed();
+  check(["ADDED", "MOVED", "REMOVED"].every((kind) => all.includes(kind)), `the list has ${all}`);
+  await page.click(".kind.added");
+  await holds("a kind is left out", () => document.querySelectorAll("#events button.ADDED").length === 0 && document.querySelectorAll("#events button.MOVED").length > 0);
+  await page.click(".kind.added");
+  const one = await page.$eval("#filter-class", (select) => select.options[1].value);
+  await page.select("#filter-class", one);
+  await holds("only one class is listed", (name) => [...document.querySelectorAll("#events button")].length > 0 && [...document.querySelectorAll("#events button")].every((row) => window.pocd.panel.events.get(Number(row.dataset.event)).class === name), one);
+  await page.select("#filter-class", "");
+  await page.select("#filter-time", "since");
+  await holds("only what came since the marker is listed", () => [...document.querySelectorAll("#events button")].length > 0 && [...document.querySelectorAll("#events button")].every((row) => window.pocd.panel.events.get(Number(row.dataset.event)).stamp >= window.pocd.time.sinceStamp()));
+  await page.select("#filter-time", "all");
+  await holds("all are listed again", (count) => document.querySelectorAll("#events button").length === count, all.length);
+  await page.click("#filter-place");
+  await holds("in view are all of them", (count) => document.querySelectorAll("#events button").length === count, all.length);
+  await page.evaluate((box) => window.pocd.stage.look(box.slice(0, 3), 1.5), moved.to);
+  await holds("in view are fewer from near", (count) => { const rows = document.querySelectorAll("#events button").length; return rows > 0 && rows < count; }, all.length);
+  await page.click("#filter-place");
+  await page.keyboard.press("Home");
+
+  // Follow, and measure.
+  await page.keyboard.press("f");
+  await holds("it follows a robot", () => document.querySelector("#tool-follow").getAttribute("aria-pressed") === "true" && /Following robot/.test(document.querySelector("#hint").textContent));
+  await shot("following");
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("Home");
+  await page.keyboard.press("t");
+  await holds("the camera is above", () => window.pocd.stage.top && !window.pocd.stage.flight);
+  await page.keyboard.press("m");
+  // Two places where there is a surface, far apart.
+  const ends = await page.evaluate(() => {
+    const { stage, surface } = window.pocd, rect = document.querySelector("#canvas").getBoundingClientRect(), hits = [];
+    for (let i = 2; i < 38; ++i) {
+      for (let k = 2; k < 30; ++k) {
+        const x = rect.left + rect.width * i / 40, y = rect.top + rect.height * k / 32, point = surface.hit(stage.rayAt(x, y).raycaster);
+        if (point && document.elementFromPoint(x, y).id === "canvas") hits.push({ x, y, at: point.toArray() });
+      }
+    }
+    return [hits[0], hits.at(-1)];
+  });
+  for (const { x, y } of ends) await page.mouse.click(x, y);
+  const across = Math.hypot(ends[0].at[0] - ends[1].at[0], ends[0].at[1] - ends[1].at[1]);
+  check(across > 3, `two surfaces are ${across} m apart`);
+  await holds("a length is measured", (length) => [...document.querySelectorAll("#labels .measure")].some((label) => { const level = /level ([0-9.]+) m/.exec(label.textContent); return level && Math.abs(Number(level[1]) - length) < 0.1; }), across);
+  await shot("measured");
+  await page.keyboard.press("m");
+  await page.keyboard.press("t");
+  await page.keyboard.press("Home");
+
   // A list entry leads there, and says why.
   await page.click("#events button.MOVED");
   await holds("the selected object's past comes", () => document.querySelector("#detail svg.curve path") !== null);
@@ -71,6 +141,7 @@ main(async () => {
   });
   check(/sel=[0-9a-f]{32}/.test(link), "the address holds the selection");
   const linked = await browser.newPage();
+  linked.setDefaultTimeout(120000);
   await linked.goto(link);
   await until(() => linked.evaluate(() => window.pocd?.panel.selected), "a link restores the selection");
   const cameras = await Promise.all([page, linked].map((one) => one.evaluate(() => window.pocd.stage.camera.position.toArray())));
@@ -95,6 +166,8 @@ main(async () => {
   await page.keyboard.press("t");
 
   // The past.
+  await page.keyboard.press("Home");
+  const asNow = await picture();
   const early = await page.evaluate(() => {
     const [first, last] = window.pocd.time.range;
     window.pocd.time.goTo(first + 0.2 * (last - first));
@@ -108,6 +181,8 @@ main(async () => {
   await holds("the map of then, which is smaller", (now) => window.pocd.then()?.map && document.querySelector("#pale").hidden && window.pocd.surface.tileCount < now && window.pocd.surface.tileCount > 0, counts.tiles);
   await holds("the robots of then", () => window.pocd.robots.shown.size > 0 && [...window.pocd.robots.shown.values()].every((r) => r.stamp <= window.pocd.time.at));
   await shot("then");
+  const asThen = await difference(asNow, await picture());
+  check(asThen > 0.02, `then looks different: ${asThen}`);
   const spoken = await page.evaluate(() => window.pocd.panel.then.length);
   check(spoken === await page.evaluate(() => window.pocd.shown().count), "the list has the objects of then");
   await page.keyboard.press("b");
@@ -119,6 +194,10 @@ main(async () => {
   check(Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) > 0.3, "before and after differ");
   await shot("before_and_after");
   await page.keyboard.press("b");
+  await page.keyboard.press("Home");
+  await holds("now is shown", () => !window.pocd.then() && !window.pocd.other());
+  const asBefore = await difference(asNow, await picture());
+  check(asBefore < 0.01, `now looks as it did before going back: ${asBefore}`);
 
   // Playing.
   await page.evaluate(() => window.pocd.time.goTo(window.pocd.time.range[0] + 5));

@@ -28,6 +28,7 @@ main(async () => {
   const open = async (address, width, height, more = {}) => {
     const page = await browser.newPage();
     await page.setViewport({ width, height, ...more });
+    page.setDefaultTimeout(120000);
     page.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
     page.on("pageerror", (error) => errors.push(String(error)));
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "dark" }]);

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Opens the page in a browser, and reads from pocd_view with other people's client of the Foxglove protocol.
+# Opens the page, and recordings in Rerun's viewer, in a browser, and reads from pocd_view with other people's client of the
+# Foxglove protocol.
 # usage: run.sh BIN_DIR WORK_DIR TEST.js. Screenshots are kept in WORK_DIR/pictures. Exit code 77:
 # skipped, there is no browser, no npm or no network.
 set -euo pipefail
@@ -14,7 +15,10 @@ command -v npm >/dev/null && command -v node >/dev/null || skip "npm and node ar
 chromium=$(command -v chromium || true)
 [[ -n $chromium || $script == foxglove.js ]] || skip "Debian's chromium is not installed"
 mkdir -p "$work"
-cp "$here/package.json" "$here"/*.js "$work"
+cp "$here"/*.js "$work"
+package=$here/package_${script%.js}.json
+[[ -f $package ]] || package=$here/package.json
+cp "$package" "$work/package.json"
 cd "$work"
 if ! npm install --no-audit --no-fund --loglevel=error >npm.log 2>&1; then
   tail -n 3 npm.log

@@ -357,7 +357,10 @@ const actions = {
   help() {
     $("help").innerHTML = helpHtml();
     if ($("help").open) $("help").close();
-    else $("help").showModal();
+    else {
+      $("help").showModal();
+      $("help").scrollTop = 0;  // its button at the end has the focus
+    }
   },
   play() { time.toggle(); },
   live() { time.live(); },
@@ -374,10 +377,10 @@ const actions = {
 for (const name of ["home", "top", "follow", "measure", "split", "theme", "link", "help"]) $(`tool-${name}`).addEventListener("click", actions[name]);
 
 addEventListener("keydown", (key) => {
-  if (key.target.matches("input, select, dialog *") || key.ctrlKey || key.metaKey || key.altKey) return;
+  if (key.target.matches("input:not([type=checkbox]), select, dialog *") || key.ctrlKey || key.metaKey || key.altKey) return;
   const bound = keyTable.find((row) => row.keys.includes(key.key));
   if (!bound) return;
-  if (key.key === " " && key.target.matches("button, summary")) return;
+  if (key.key === " " && key.target.matches("button, summary, input")) return;
   key.preventDefault();
   if (bound.action) return actions[bound.action]();
   const target = stage.controls.target, reach = stage.camera.position.distanceTo(target);
@@ -394,6 +397,9 @@ addEventListener("keydown", (key) => {
   }
   stage.touched = true;
 });
+
+// What was chosen is chosen: the keys are the page's again.
+for (const select of document.querySelectorAll("select")) select.addEventListener("change", () => select.blur());
 
 // A click is a press that does not move; a drag is the camera's.
 let pressedAt = null;

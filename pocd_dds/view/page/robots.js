@@ -5,6 +5,7 @@ import { Lines } from "./lines.js";
 const kCone = 1.3;    // length of the drawn view [m]
 const kTrail = 200;   // places
 const kStep = 0.15;   // between them [m]
+const kGap = 1.2;     // farther apart than that: what lies between was not heard [m]
 
 function turned([x, y, z, w], [a, b, c]) {
   const tx = 2 * (y * c - z * b), ty = 2 * (z * a - x * c), tz = 2 * (x * b - y * a);
@@ -80,7 +81,10 @@ export class Robots {
       });
       this.lines.add([at[0], at[1], 0], at, rgb, 2.5);
       const trail = this.then ? [[at[0], at[1], 0.04], ...robot.trail.map(([x, y]) => [x, y, 0.04])].reverse() : this.trails.get(robot.name);
-      for (let i = 1; i < trail.length; ++i) this.lines.add(trail[i - 1], trail[i], rgb, 1.6, 0.15 + 0.5 * i / trail.length);
+      for (let i = 1; i < trail.length; ++i) {
+        if (Math.hypot(trail[i - 1][0] - trail[i][0], trail[i - 1][1] - trail[i][1]) > kGap) continue;
+        this.lines.add(trail[i - 1], trail[i], rgb, 1.6, 0.15 + 0.5 * i / trail.length);
+      }
       this.labels.push({ at: [at[0], at[1], at[2] + 0.2], text: robot.name, kind: "robot", rank: 1 });
     }
     this.lines.end();

@@ -115,7 +115,7 @@ export class Stage {
     const size = box.getSize(new THREE.Vector3()), target = box.getCenter(new THREE.Vector3());
     target.z = Math.min(target.z, box.min.z + 1);
     const half = Math.tan(THREE.Math.degToRad(this.camera.fov / 2)), aspect = this.partWidth / this.height;
-    const flat = this.top ? Math.max(size.y / 2, size.x / 2 / aspect) : Math.max(0.36 * (size.x + size.y), 0.5 * Math.hypot(size.x, size.y) / aspect);
+    const flat = this.top ? Math.max(size.y / 2, size.x / 2 / aspect) : Math.max(0.31 * (size.x + size.y), 0.48 * Math.hypot(size.x, size.y) / aspect);
     const distance = Math.max(2, 1.06 * flat / half);
     const away = this.top ? new THREE.Vector3(0, -0.001, 1) : new THREE.Vector3(-0.5, -0.72, 0.82).normalize();
     const eye = target.clone().addScaledVector(away.normalize(), distance);
