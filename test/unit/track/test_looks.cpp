@@ -249,32 +249,5 @@ TEST_F(HiddenCandidate, LapsesAtLastAndItsSurfaceStays) {
   EXPECT_EQ(rig_.count(EventKind::kRemoved), 0u) << "nobody was told of it";
 }
 
-/// Two boxes beside each other, one a little farther off, and a post before the gap: nothing was
-/// ever seen between them.
-class BehindAPost : public ::testing::Test {
- protected:
-  Scene scene(bool two) const {
-    const SceneObject post = solid(kCageClass, {0.0, 1.2}, {0.5, 0.1, 1.6});
-    if (!two) return room_with({post, solid(kBoxClass, {0.0, 1.95}, {1.5, 0.4, 1.2})});
-    return room_with({post, solid(kBoxClass, {-0.45, 1.95}, {0.6, 0.4, 1.2}),
-                      solid(kBoxClass, {0.45, 2.05}, {0.6, 0.4, 1.2})});
-  }
-  std::size_t boxes_after_two_visits(bool two) {
-    const auto apart = [](test::Segmented& s) { test::cut(s, kBoxClass, 0.0f, 1, 2); };
-    const auto open = [](test::Segmented& s) { test::cut(s, kBoxClass, 0.0f); };
-    TrackerRig rig;
-    rig.look_times(20, scene(two), two ? TrackerRig::Edit(open) : TrackerRig::Edit(apart));
-    const std::size_t before = rig.of_class(kBoxClass).size();
-    EXPECT_EQ(before, 2u) << rig.told();
-    rig.look(scene(two), open, 20.0);
-    rig.look_times(5, scene(two), open);
-    return rig.of_class(kBoxClass).size();
-  }
-};
-
-TEST_F(BehindAPost, SurfacesThatFaceOneWayAreTwoThingsInARow) {
-  EXPECT_EQ(boxes_after_two_visits(true), 2u);
-}
-
 }  // namespace
 }  // namespace pocd
