@@ -11,6 +11,7 @@
 #include "pocd/eval/surface_points.hpp"
 #include "pocd/objects/object_model.hpp"
 #include "pocd/registration/point_to_plane_icp.hpp"
+#include "pocd/track/rules.hpp"
 
 namespace pocd {
 namespace {
@@ -199,7 +200,8 @@ class PublishedMethod final : public MappingMethod {
       map_.clear_object(id);
       std::replace(owners_.begin(), owners_.end(), to_index(id), IntegrationInput::kSkip);
       result.retired.push_back(id);
-      report(EventKind::kRemoved, "stationarity_below_threshold", frame, *thing, result);
+      report(EventKind::kRemoved, rule_text(Rule::kStationarityBelowThreshold), frame, *thing,
+             result);
     }
     things_.erase(std::remove_if(things_.begin(), things_.end(),
                                  [&](const auto& thing) { return is_gone(*thing); }),
@@ -286,7 +288,7 @@ class PublishedMethod final : public MappingMethod {
     map_.integrate(input, pool_);
   }
 
-  void report(EventKind kind, const char* rule, const Frame& frame, const Thing& thing,
+  void report(EventKind kind, const std::string& rule, const Frame& frame, const Thing& thing,
               FrameResult& result) {
     ObjectEvent event;
     event.sequence = next_event_++;

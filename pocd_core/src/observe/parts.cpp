@@ -146,7 +146,9 @@ class Divider {
         continue;
       }
       if (box_overlap(look.object->box, observation.box, 4.0 * config_.spacing_m) <= 0.0) continue;
-      const bool same_class = look.object->class_id == observation.class_id;
+      // Without masks nobody knows what class a thing is of.
+      const bool same_class =
+          look.object->class_id == observation.class_id || observation.class_id == kThing;
       const bool same_thing = observation.instance == 0 || look.observation == index ||
                               look.observation == Observations::kNone ||
                               observations_.list[look.observation].instance == 0;
@@ -210,6 +212,15 @@ class Divider {
     return count;
   }
 
+  /// Whether most of the piece lies in the box.
+  bool lies_within(const std::vector<std::int32_t>& piece, const std::vector<SurfacePoint>& points,
+                   const OrientedBox& box) const {
+    const auto inside = std::count_if(piece.begin(), piece.end(), [&](std::int32_t i) {
+      return is_inside(box, 2.0 * config_.spacing_m, points[i].point_W);
+    });
+    return 2 * static_cast<std::size_t>(inside) > piece.size();
+  }
+
   void give(std::int32_t index, const std::vector<std::int32_t>& piece, bool arrived,
             const std::vector<SurfacePoint>& points, std::vector<Part>& parts) {
     Look* best = nullptr;
@@ -217,6 +228,11 @@ class Divider {
     bool beside_contested = false;
     for (const Owner& owner : owners_) {
       if (owner.explained < kLeastShared) continue;
+      // What has no class may be a wall behind the object, unless it lies within.
+      if (owner.look->object->class_id != observations_.list[index].class_id &&
+          !lies_within(piece, points, owner.look->object->box)) {
+        continue;
+      }
       const int count = contacts(piece, points, *owner.look);
       if (count <= most) continue;
       beside_contested |= owner.look->contested;

@@ -12,6 +12,7 @@
 #include "looked_at.hpp"
 #include "pocd/input/pose_gate.hpp"
 #include "pocd/segmentation/planes.hpp"
+#include "robot_notes.hpp"
 
 namespace pocd {
 
@@ -44,6 +45,21 @@ struct ArchiveAccess {
   static void describe(Archive& a, GroundModel& ground) {
     auto& [known, from_class, normal_W, offset_m, level_m, is_strip] = ground;
     a(known, from_class, normal_W, offset_m, level_m, is_strip);
+  }
+  template <class Archive>
+  static void describe(Archive& a, Grounds& grounds) {
+    auto& [robots] = grounds;
+    by_robot(a, robots);
+  }
+  template <class Archive>
+  static void describe(Archive& a, MaskWatch::Sends& sends) {
+    auto& [missing_since_ns] = sends;
+    a(missing_since_ns);
+  }
+  template <class Archive>
+  static void describe(Archive& a, MaskWatch& masks) {
+    auto& [robots] = masks;
+    by_robot(a, robots);
   }
   template <class Archive>
   static void describe(Archive& a, IgnoredRegions& ignored) {

@@ -111,15 +111,16 @@ void archive(Archive& a, LibraryObject& object) {
                           moved, first_seen_ns, last_seen_ns, in_reach_ns, visit_ns, placed_ns,
                           in_place_ns, last_robot, seen_by, moment, observations, confirmed,
                           added_ns, reported_box, changed, looks_missed, looks_unobserved,
-                          unobserved_since_ns, looks_displaced, looks_losing, lost, companions,
-                          box_surfels, most_surfels, most_free, icp_target] = object;
+                          unobserved_since_ns, looks_displaced, displaced_since_ns, looks_losing,
+                          lost, companions, box_surfels, most_surfels, most_free, icp_target] =
+      object;
   a.version(1);
   a(class_id, stationarity_class, box, centroid_W, belief, arrival, moved);
   a(first_seen_ns, last_seen_ns, in_reach_ns, visit_ns, placed_ns, in_place_ns);
   a(last_robot, seen_by, moment, observations);
   a(confirmed, added_ns, reported_box, changed, looks_missed, looks_unobserved);
-  a(unobserved_since_ns, looks_displaced, looks_losing, lost, companions, box_surfels);
-  a(most_surfels, most_free);
+  a(unobserved_since_ns, looks_displaced, displaced_since_ns, looks_losing, lost, companions);
+  a(box_surfels, most_surfels, most_free);
 }
 
 template <class Archive>

@@ -4,6 +4,7 @@
 #include "../track/object_tracker.hpp"
 #include "ignored_regions.hpp"
 #include "pocd/pipeline/operator_word.hpp"
+#include "robot_notes.hpp"
 
 namespace pocd {
 
@@ -11,7 +12,7 @@ struct WordParts {
   StampNs stamp_ns;  ///< of the newest frame
   ObjectTracker& tracker;
   TsdfMap& map;
-  GroundModel& ground;
+  Grounds& grounds;
   IgnoredRegions& ignored;
 };
 

@@ -113,7 +113,7 @@ std::string reset(const ObjectTracker::Said& said, const WordParts& parts, Frame
   const auto all = [](const Eigen::Vector2d&) { return true; };
   const std::size_t objects = forget_objects(all, said, parts, result);
   parts.tracker.forget_places(all);
-  parts.ground = GroundModel();
+  parts.grounds.clear();
   return counted(objects, "object") + " and the map forgotten";
 }
 

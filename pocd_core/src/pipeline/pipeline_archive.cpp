@@ -52,9 +52,9 @@ void PipelineArchive::add(PieceKind kind, std::uint64_t key, std::vector<std::ui
 std::vector<Piece> PipelineArchive::take_changed(const PipelineParts& parts) {
   std::vector<Piece> out;
   SaveArchive gates;
-  gates(parts.clock, parts.gate, parts.robots_with_masks);
+  gates(parts.clock, parts.gate, parts.masks);
   add(PieceKind::kPart, kGates, gates.take(), out);
-  add(PieceKind::kPart, kGround, archived(parts.ground), out);
+  add(PieceKind::kPart, kGround, archived(parts.grounds), out);
   SaveArchive tracker;
   tracker(parts.tracker);
   add(PieceKind::kPart, kTracker, tracker.take(), out, tracker.take_sections());
@@ -91,9 +91,9 @@ void PipelineArchive::restore(const PipelineParts& parts, const std::vector<Piec
       case PieceKind::kPart:
         found.insert(piece.key);
         if (piece.key == kGates) {
-          a(parts.clock, parts.gate, parts.robots_with_masks);
+          a(parts.clock, parts.gate, parts.masks);
         } else if (piece.key == kGround) {
-          a(parts.ground);
+          a(parts.grounds);
         } else if (piece.key == kTracker) {
           a(parts.tracker);
         } else if (piece.key == kIgnored) {

@@ -13,9 +13,10 @@
 namespace pocd {
 
 class FrameClock;
-class GroundModel;
+class Grounds;
 class IgnoredRegions;
 class LookedAt;
+class MaskWatch;
 class ObjectTracker;
 class PoseGate;
 
@@ -23,8 +24,8 @@ class PoseGate;
 struct PipelineParts {
   FrameClock& clock;
   PoseGate& gate;
-  GroundModel& ground;
-  std::set<std::string>& robots_with_masks;
+  Grounds& grounds;
+  MaskWatch& masks;
   IgnoredRegions& ignored;
   LookedAt& looked_at;
   ObjectTracker& tracker;

@@ -17,6 +17,7 @@
 #include "pocd/common/check_parameters.hpp"
 #include "pocd/common/cpu_time.hpp"
 #include "pocd/segmentation/things.hpp"
+#include "robot_notes.hpp"
 
 namespace pocd {
 namespace {
@@ -51,6 +52,16 @@ std::string off_text(const Frame& frame, StampNs newest_ns) {
   return (frame.robot.empty() ? "" : frame.robot + ": ") + text;
 }
 
+std::string masks_ended_text(const Frame& frame, const ClassMap& classes) {
+  const auto seconds = MaskWatch::kEnded / 1'000'000'000;
+  return (frame.robot.empty() ? "" : frame.robot + ": ") + "no segmentation image for " +
+         std::to_string(seconds) + " s: goes on without, " +
+         (classes.without_masks == "things"
+              ? "with things by geometry"
+              : "all pixels are of class " +
+                    classes.name(static_cast<ClassId>(classes.default_class)));
+}
+
 }  // namespace
 
 struct PocdPipeline::Impl {
@@ -69,10 +80,10 @@ struct PocdPipeline::Impl {
   ThreadPool pool;
   FrameClock frame_clock;
   PoseGate pose_gate;
-  GroundModel ground;
+  Grounds grounds;
   ObjectTracker tracker;
   TsdfMap map;
-  std::set<std::string> robots_with_masks;
+  MaskWatch masks;
   IgnoredRegions ignored;
   LookedAt looked_at;
   // Memory of a frame, kept between frames.
@@ -86,18 +97,11 @@ struct PocdPipeline::Impl {
 
   PipelineParts parts() {
     // All members: one that is added does not compile until it was decided whether it is kept.
-    [[maybe_unused]] auto& [config_, classes_, pool_, frame_clock_, pose_gate_, ground_, tracker_,
-                            map_, robots_with_masks_, ignored_regions_, looked_at_, cloud_, planes_,
+    [[maybe_unused]] auto& [config_, classes_, pool_, frame_clock_, pose_gate_, grounds_, tracker_,
+                            map_, masks_, ignored_regions_, looked_at_, cloud_, planes_,
                             observations_, field_, owner_of_pixel_, mask_missing_, archive_] =
         *this;
-    return {frame_clock_,     pose_gate_, ground_, robots_with_masks_,
-            ignored_regions_, looked_at_, tracker_};
-  }
-
-  /// Whether a robot that delivers masks did not this time.
-  bool mask_is_missing(const Frame& frame) {
-    if (!frame.labels.empty()) robots_with_masks.insert(frame.robot);
-    return frame.labels.empty() && robots_with_masks.count(frame.robot) > 0;
+    return {frame_clock_, pose_gate_, grounds_, masks_, ignored_regions_, looked_at_, tracker_};
   }
 
   /// Before anything changes: a frame that is refused later would leave half of its traces.
@@ -137,10 +141,12 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
 
   organize(frame, segmentation.stride, p.config.map.max_depth_m, p.config.classes, p.classes,
            p.pool, p.cloud);
-  p.mask_missing = p.mask_is_missing(frame);
-  if (frame.labels.empty() && !p.mask_missing && p.config.classes.without_masks == "things") {
-    take_for_things(p.cloud);
-  }
+  const MaskWatch::Masks masks = p.masks.judge(frame.robot, frame.stamp_ns, !frame.labels.empty());
+  p.mask_missing = masks == MaskWatch::Masks::kMissing;
+  if (masks == MaskWatch::Masks::kEnd)
+    result.warnings.push_back(masks_ended_text(frame, p.config.classes));
+  const bool without = masks == MaskWatch::Masks::kNone || masks == MaskWatch::Masks::kEnd;
+  if (without && p.config.classes.without_masks == "things") take_for_things(p.cloud);
   p.ignored.mark(p.config.map.max_depth_m, p.pool, p.cloud);
   clock.done("organize");
   Frame placed = frame;  // images are shared, not copied
@@ -153,7 +159,8 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   clock.done("pose");
   segment_planes(p.cloud, segmentation, noise, p.planes);
   vote_planes(p.planes, segmentation.majority_share, p.cloud);
-  p.ground.update(p.planes, segmentation, noise, p.cloud);
+  GroundModel& ground = p.grounds.of(frame.robot);
+  ground.update(p.planes, segmentation, noise, p.cloud);
   clock.done("clean");
   if (p.mask_missing) {
     // What things are would be a guess: they may be seen to be gone, but nothing is learnt of them.
@@ -168,7 +175,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   clock.done("cluster");
   p.looked_at.note(p.cloud, frame.stamp_ns);
   p.field.update(p.cloud);
-  p.tracker.update(frame, p.cloud, p.field, p.observations, p.ground, p.map, p.owner_of_pixel,
+  p.tracker.update(frame, p.cloud, p.field, p.observations, ground, p.map, p.owner_of_pixel,
                    result);
   clock.done("objects");
   p.integrate(placed);
@@ -229,7 +236,7 @@ std::vector<RegionLook> PocdPipeline::looks() const { return impl_->looked_at.al
 
 WordOutcome PocdPipeline::apply(const OperatorWord& word) {
   Impl& p = *impl_;
-  return follow(word, {p.frame_clock.newest_ns(), p.tracker, p.map, p.ground, p.ignored});
+  return follow(word, {p.frame_clock.newest_ns(), p.tracker, p.map, p.grounds, p.ignored});
 }
 
 std::vector<Piece> PocdPipeline::take_changed_pieces() {

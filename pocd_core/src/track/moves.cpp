@@ -205,8 +205,8 @@ LibraryObject* ObjectTracker::find_departed(const Step& step, const Departure& d
   return best && may_tell(motion, departure, *best, now_ns) ? best : nullptr;
 }
 
-void ObjectTracker::depart(Step& step, Departure departure, const std::string& rule) {
-  departure.evidence.rule = rule;
+void ObjectTracker::depart(Step& step, Departure departure, Rule rule) {
+  departure.evidence.rule = rule_text(rule);
   const auto moves =
       departures_.recent_moves(step.frame.stamp_ns, config_.state.relocation_window_s);
   for (auto move = moves.rbegin(); move != moves.rend(); ++move) {
@@ -249,7 +249,7 @@ bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
   }
   if (!best || !may_tell(motion, *best, object, step.frame.stamp_ns)) return false;
   const Departure from = *best;
-  report_move(step, object, from, motion.T_new_old, "found_again");
+  report_move(step, object, from, motion.T_new_old, Rule::kFoundAgain);
   return true;
 }
 
@@ -264,7 +264,7 @@ void ObjectTracker::find_far_moves(Step& step) {
     departures_.set_asked_far(d.id);
     Motion motion;
     if (LibraryObject* found = find_departed(step, d, motion))
-      report_move(step, *found, d, motion.T_new_old, "found_again");
+      report_move(step, *found, d, motion.T_new_old, Rule::kFoundAgain);
   }
   while (!arrivals_.empty()) {
     LibraryObject* object = library_.find(arrivals_.front());
@@ -284,11 +284,11 @@ void ObjectTracker::confirm(Step& step, LibraryObject& object) {
   arrivals_.push_back(object.id);
   hide_space_behind(step, object, 0);
   mark_changed(object);
-  add_event(step, EventKind::kAdded, object, to_string(object.arrival));
+  add_event(step, EventKind::kAdded, object, added_rule(object.arrival));
 }
 
 void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departure& from,
-                                const Pose& T_new_old, const std::string& rule) {
+                                const Pose& T_new_old, Rule rule) {
   const std::optional<ObjectId> absorbed =
       found.confirmed ? std::make_optional(found.id) : std::nullopt;
   const ObjectId old = found.id;
@@ -335,7 +335,7 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   event.previous_box = before;
   event.absorbed = absorbed;
   event.evidence = from.evidence;
-  event.evidence.rule = rule;
+  event.evidence.rule = rule_text(rule);
   event.last_there_ns = from.in_place_ns;
   event.first_gone_ns = from.first_gone_ns;
   move.from = before;

@@ -134,8 +134,7 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   refit_box(step, survivor);
   if (!was_known) return;
   step.result.retired.push_back(absorbed_id);
-  add_event(step, EventKind::kUpdated, survivor, "joined_" + std::to_string(to_index(absorbed_id)))
-      .absorbed = absorbed_id;
+  add_event(step, EventKind::kUpdated, survivor, Rule::kJoined, absorbed_id).absorbed = absorbed_id;
   survivor.reported_box = survivor.box;
 }
 

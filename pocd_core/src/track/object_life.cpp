@@ -22,6 +22,9 @@ constexpr double kEdgeShare = 0.1;
 constexpr int kGoneLooks = 3;
 /// A candidate that was seen through in this many looks was never there, or moves.
 constexpr int kCandidateGoneLooks = 2;
+/// A candidate that was not measured for long lapses when it has been looked at for so long in this
+/// visit [s].
+constexpr double kLapseLookS = 1.0;
 /// An object that lost more than this share of its surface to erosion is gone.
 constexpr double kLeastSurfelShare = 0.15;
 
@@ -130,12 +133,12 @@ void ObjectTracker::lose_surface(Step& step) {
     object.looks_losing = 0;
     std::vector<std::uint8_t> marked(surfels.size(), 0);
     for (std::size_t i = 0; i < surfels.size(); ++i) marked[i] = surfels[i].seen_through >= frames;
-    lose_part(step, object, marked, "part_seen_through");
+    lose_part(step, object, marked, Rule::kPartSeenThrough);
   }
 }
 
 void ObjectTracker::lose_part(Step& step, LibraryObject& object,
-                              const std::vector<std::uint8_t>& marked, const std::string& rule) {
+                              const std::vector<std::uint8_t>& marked, Rule rule) {
   const OrientedBox whole_box = object.box;
   const std::size_t before = object.model.surfels().size();
   const std::size_t piece =
@@ -187,7 +190,7 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
     // That was measured of what is gone. The rest was measured in place.
     begin_anew(step, object);
   }
-  add_event(step, EventKind::kUpdated, object, "part_removed").previous_box = whole_box;
+  add_event(step, EventKind::kUpdated, object, Rule::kPartRemoved).previous_box = whole_box;
   object.reported_box = object.box;
   object.lost = 0;
   depart(step, std::move(departure), rule);
@@ -233,22 +236,28 @@ void ObjectTracker::remove_objects(Step& step) {
                looked.end());
   std::sort(looked.begin(), looked.end(),
             [](const auto& a, const auto& b) { return a.first->id < b.first->id; });
+  const auto lapse_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  const auto looked_ns = static_cast<StampNs>(kLapseLookS * 1e9);
   for (const auto& [object, verdict] : looked) {
     if (!object->confirmed) {
       if (object->looks_unobserved >= kCandidateGoneLooks ||
           object->belief.stationarity() < config_.state.remove_below) {
-        remove(step, *object, "candidate_seen_through");
+        remove(step, *object, Rule::kCandidateSeenThrough);
       } else if (object->looks_missed > config_.state.tentative_frames) {
-        remove(step, *object, "never_confirmed");
+        remove(step, *object, Rule::kNeverConfirmed);
+      } else if (step.frame.stamp_ns - object->last_seen_ns > lapse_ns &&
+                 step.frame.stamp_ns - object->visit_ns > looked_ns) {
+        remove(step, *object, Rule::kCandidateLapsed);
       }
       continue;
     }
     if (static_cast<double>(object->model.surfels().size()) <
         kLeastSurfelShare * static_cast<double>(object->most_surfels)) {
-      remove(step, *object, "nothing_left");
+      remove(step, *object, Rule::kNothingLeft);
       continue;
     }
     if (verdict != Verdict::kUnobserved || object->looks_unobserved < kGoneLooks ||
+        !lasts(step, object->unobserved_since_ns) ||
         object->belief.stationarity() >= config_.state.remove_below) {
       continue;
     }
@@ -276,17 +285,17 @@ void ObjectTracker::remove_objects(Step& step) {
     }
     if (static_cast<double>(standing_count) <=
         kStandingShare * static_cast<double>(standing_count + gone_count)) {
-      remove(step, *object, "stationarity_below_threshold");
+      remove(step, *object, Rule::kStationarityBelowThreshold);
       continue;
     }
     mark_unseen(surfels, standing, gone);
     object->looks_unobserved = 0;
-    lose_part(step, *object, gone, "stationarity_below_threshold");
+    lose_part(step, *object, gone, Rule::kStationarityBelowThreshold);
     if (object->belief.stationarity() < config_.state.remove_below) begin_anew(step, *object);
   }
 }
 
-void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string& rule) {
+void ObjectTracker::remove(Step& step, LibraryObject& object, Rule rule) {
   Departure departure;
   departure.id = object.id;
   departure.class_id = object.class_id;
@@ -300,7 +309,9 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, const std::string&
   departure.seen_by = object.seen_by;
   departure.evidence = evidence_of(step, object);
   const bool was_known = object.confirmed;
-  clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
+  // What lapses was hidden: nobody has seen that it is not there.
+  if (rule != Rule::kCandidateLapsed)
+    clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
   step.map.reassign_object(object.id, ObjectId::kNone);  // what stays is not of it
   std::replace(step.owners.begin(), step.owners.end(), object.id, ObjectId::kNone);
   for (std::size_t n = 0; n < step.look_count; ++n) {
@@ -366,7 +377,8 @@ void ObjectTracker::report_changes(Step& step) {
     if (shift_m <= notable_m && growth_m <= notable_m) continue;
     // Seen better, what was reported as new may turn out to be what departed before.
     if (object->added_ns && find_origin(step, *object)) continue;
-    add_event(step, EventKind::kUpdated, *object, object->lost > 0 ? "part_removed" : "grew");
+    add_event(step, EventKind::kUpdated, *object,
+              object->lost > 0 ? Rule::kPartRemoved : Rule::kGrew);
     object->reported_box = object->box;
     object->lost = 0;
   }

@@ -74,6 +74,7 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     bound(object->placed_ns);
     bound(object->in_place_ns);
     bound(object->unobserved_since_ns);
+    bound(object->displaced_since_ns);
     if (object->added_ns) bound(*object->added_ns);
     for (Surfel& s : object->model.surfels()) bound(s.last_hit_ns);
     object->moment = {};
@@ -127,8 +128,9 @@ void ObjectTracker::update_beliefs(Step& step) {
         break;
       case Verdict::kDisplaced:
         object.looks_unobserved = 0;
-        if (first) ++object.looks_displaced;
-        if (object.looks_displaced >= kDisplacedLooks) move_displaced(step, look);
+        if (first && object.looks_displaced++ == 0) object.displaced_since_ns = step.frame.stamp_ns;
+        if (object.looks_displaced >= kDisplacedLooks && lasts(step, object.displaced_since_ns))
+          move_displaced(step, look);
         break;
       case Verdict::kUnobserved:
         if (!measure(step, look, config_.change.delta_max_m)) break;
@@ -137,6 +139,10 @@ void ObjectTracker::update_beliefs(Step& step) {
         break;
     }
   }
+}
+
+bool ObjectTracker::lasts(const Step& step, StampNs since_ns) const {
+  return step.frame.stamp_ns - since_ns >= static_cast<StampNs>(config_.state.moment_s * 1e9);
 }
 
 void ObjectTracker::move_displaced(Step& step, Look& look) {
@@ -162,7 +168,7 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   object.arrival = Arrival::kArrived;
   object.moved = true;
   object.placed_ns = step.frame.stamp_ns;
-  ObjectEvent& event = add_event(step, EventKind::kMoved, object, "aligned_elsewhere");
+  ObjectEvent& event = add_event(step, EventKind::kMoved, object, Rule::kAlignedElsewhere);
   event.previous_box = previous_box;
   event.last_there_ns = move.in_place_ns;
   object.reported_box = object.box;
@@ -365,7 +371,7 @@ Evidence ObjectTracker::evidence_of(const Step& step, const LibraryObject& objec
 }
 
 ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryObject& object,
-                                      const std::string& rule) {
+                                      Rule rule, ObjectId other) {
   ObjectEvent event;
   event.sequence = next_event_++;
   event.kind = kind;
@@ -377,7 +383,7 @@ ObjectEvent& ObjectTracker::add_event(Step& step, EventKind kind, const LibraryO
   event.box = object.box;
   if (kind == EventKind::kAdded) event.arrival = object.arrival;
   event.evidence = evidence_of(step, object);
-  event.evidence.rule = rule;
+  event.evidence.rule = rule_text(rule, other);
   step.result.events.push_back(std::move(event));
   return step.result.events.back();
 }

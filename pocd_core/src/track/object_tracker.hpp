@@ -17,6 +17,7 @@
 #include "pocd/observe/parts.hpp"
 #include "pocd/segmentation/planes.hpp"
 #include "pocd/track/departures.hpp"
+#include "pocd/track/rules.hpp"
 #include "pocd/track/tracker_config.hpp"
 
 namespace pocd {
@@ -77,6 +78,8 @@ class ObjectTracker {
   /// Puts the frame's measurement into the belief and into the step's evidence; false when another
   /// robot has told more of the object in this moment.
   bool measure(Step& step, Look& look, double delta_m);
+  /// Whether what began then lasts for longer than a moment: looks of one moment are one.
+  bool lasts(const Step& step, StampNs since_ns) const;
   double measurement_sigma(const Step& step, const LibraryObject& object) const;
   void move_displaced(Step& step, Look& look);
   void fuse(Step& step, LibraryObject& object, const std::vector<SurfacePoint>& points);
@@ -104,16 +107,16 @@ class ObjectTracker {
   /// Takes the marked surfels out of the object and the map, and reports them as gone when they are
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,
-                 const std::string& rule);
+                 Rule rule);
   /// The rest of an object has told nothing yet: alpha and beta of a new one, no measurement.
   void begin_anew(Step& step, LibraryObject& object);
   /// Clears the object's voxels where `inside` says so, but for those at which this frame or
   /// another object has a surface.
   void clear_gone(Step& step, ObjectId id,
                   const std::function<bool(const Eigen::Vector3d&)>& inside);
-  void remove(Step& step, LibraryObject& object, const std::string& rule);
+  void remove(Step& step, LibraryObject& object, Rule rule);
   /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
-  void depart(Step& step, Departure departure, const std::string& rule);
+  void depart(Step& step, Departure departure, Rule rule);
   void confirm(Step& step, LibraryObject& object);
   /// Reports the object as moved when it is one that departed; false when there is none.
   bool find_origin(Step& step, LibraryObject& object);
@@ -134,7 +137,7 @@ class ObjectTracker {
   /// Moves over a distance, once what departed and what arrived are known for kFarWaitS.
   void find_far_moves(Step& step);
   void report_move(Step& step, LibraryObject& found, const Departure& from, const Pose& T_new_old,
-                   const std::string& rule);
+                   Rule rule);
   enum class Along {
     kNo,      ///< the motion does not explain what departed
     kJoined,  ///< it was a side of the thing that moved, and is of it now
@@ -146,8 +149,9 @@ class ObjectTracker {
   void gather_sides(Step& step, Move move);
   void mark_changed(LibraryObject& object);
   Evidence evidence_of(const Step& step, const LibraryObject& object) const;
-  ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object,
-                         const std::string& rule);
+  /// `other`: the object that was joined with this one, for Rule::kJoined.
+  ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object, Rule rule,
+                         ObjectId other = ObjectId::kNone);
   bool seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const;
   Arrival arrival_of(const LibraryObject& object) const;
   /// Surfaces that are no farther apart touch each other [m].

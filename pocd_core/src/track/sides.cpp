@@ -102,13 +102,16 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const Libra
 void ObjectTracker::join_sides(Step& step) {
   const auto gap_ns = static_cast<StampNs>(config_.state.visit_gap_s * 1e9);
   const ViewBall view = view_ball(step.cloud, config_.map.max_depth_m);
-  std::vector<ObjectId> visited;
+  std::vector<ObjectId> visited, rows_end;
   for (const ObjectId id : library_.near(view.center_W, view.radius_m)) {
     LibraryObject* object = library_.find(id);
     const bool anew = step.frame.stamp_ns - object->in_reach_ns > gap_ns;
+    // Of cameras whose every look is a visit, visits in a row count.
+    const bool one_look = object->visit_ns == object->in_reach_ns;
     object->in_reach_ns = step.frame.stamp_ns;
     if (!anew) continue;
     object->visit_ns = step.frame.stamp_ns;
+    if (!one_look) rows_end.push_back(id);
     if (object->confirmed) visited.push_back(id);
   }
   for (const ObjectId id : visited) {
@@ -130,6 +133,11 @@ void ObjectTracker::join_sides(Step& step) {
         break;
       }
     }
+  }
+  // Looks in a row are of one visit: what was in doubt then is asked anew.
+  for (const ObjectId id : rows_end) {
+    if (LibraryObject* object = library_.find(id))
+      object->looks_unobserved = object->looks_displaced = object->looks_losing = 0;
   }
 }
 
@@ -192,15 +200,15 @@ ObjectTracker::Along ObjectTracker::went_along(Step& step, const Departure& depa
     moved->most_surfels = std::max(moved->most_surfels, moved->model.surfels().size());
     refit_box(step, *moved);
     mark_changed(*moved);
-    ObjectEvent& event = add_event(step, EventKind::kUpdated, *moved,
-                                   "joined_" + std::to_string(to_index(departure.id)));
+    ObjectEvent& event = add_event(step, EventKind::kUpdated, *moved, Rule::kJoined, departure.id);
     if (departure.part_of == ObjectId::kNone) event.absorbed = departure.id;
     moved->reported_box = moved->box;
     return Along::kJoined;
   }
   const auto most = std::max_element(on_arrival.begin(), on_arrival.end());
   if (most == on_arrival.end() || *most < kAlongSeenShare * all) return Along::kNo;
-  report_move(step, *arrivals[most - on_arrival.begin()], departure, move.T_new_old, "moved_alike");
+  report_move(step, *arrivals[most - on_arrival.begin()], departure, move.T_new_old,
+              Rule::kMovedAlike);
   return Along::kMoved;
 }
 

@@ -21,11 +21,8 @@ export function durationText(s) {
 }
 
 const rules = {
-  confirmed: "it was seen often enough to be sure of it",
   stationarity_below_threshold: "the belief that it stays where it is fell below the threshold",
-  change_established: "the belief is sure that its place has changed",
   nothing_left: "nearly all of its surface was seen to be gone",
-  place_taken: "something else stands in its place",
   found_again: "an object that had gone was found again here",
   moved_alike: "it went the way that a thing beside it went",
   aligned_elsewhere: "its surface fits at another place",
@@ -33,14 +30,15 @@ const rules = {
   grew: "more of it was seen",
   part_seen_through: "a part of it was seen to be gone",
   found: "it was found where nobody had looked before",
-  never_confirmed: "it was not seen often enough to be sure of it",
-  conflict: "something that is not it was seen in its place",
+  arrived: "it stands where it was empty before",
+  unknown: "it was seen; whether it stood there before is not known",
   forget_object: "it is to be forgotten",
   confirm_removal: "a person has seen that it is gone",
   forget_region: "everything in a region is to be forgotten",
   ignore_region: "a region is not to be looked at",
   heed_region: "a region is to be looked at again",
   reset: "everything is to be forgotten",
+  save: "the memory is to be written",
 };
 
 export function ruleText(rule) {

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "pocd/config/config_io.hpp"
+#include "pocd/config/node_config.hpp"
+
 namespace pocd {
 namespace {
 
@@ -123,6 +126,21 @@ TEST_F(PoseGateTest, RobotsThatWereHeardOfLastAreKept) {
   EXPECT_EQ(gate_.robots(), PoseGate::kMostRobots);
   EXPECT_FALSE(show(names, 50.0, 0.0, "name0")) << "forgotten, and so as new";
   EXPECT_TRUE(show(names + 1, 500.0, 0.0, "name" + std::to_string(names - 1)));
+}
+
+// They look opposite ways, half a metre apart, a few milliseconds after each other.
+TEST_F(PoseGateTest, FrontAndBackCameraOfOneRobotDoNotTripEachOther) {
+  NodeFile file;
+  const std::string folder = std::string(POCD_SOURCE_DIR) + "/config/";
+  load_config(file, {folder + "torwic.yaml", folder + "cameras/two_cameras.yaml"});
+  const auto& robots = file.node.robots;
+  ASSERT_EQ(robots.size(), 2u);
+  EXPECT_NE(robots[0].name, robots[1].name);
+  for (int i = 0; i < 60; ++i) {
+    EXPECT_FALSE(show(i, 0.05 * i, 3.0 * i, robots[0].name)) << i;
+    EXPECT_FALSE(show(i, 0.05 * i - 0.5, 3.0 * i + 180.0, robots[1].name)) << i;
+  }
+  EXPECT_TRUE(show(60, 3.0 - 0.5, 180.0, robots[0].name)) << "one would be off by a turn";
 }
 
 }  // namespace

@@ -174,5 +174,26 @@ TEST_F(FreeSpaceTest, SurfacesOfStillThingsAreNeverSeenEmpty) {
   EXPECT_EQ(free_found, free_asked) << "and free places are";
 }
 
+// Driven over again and again at three headings.
+TEST_F(FreeSpaceTest, MemoryFollowsTheSpaceNotTheTime) {
+  std::size_t after_once = 0;
+  for (int round = 0; round < 6; ++round) {
+    for (const double yaw_rad : {-0.6, 0.0, 0.6}) {
+      for (const double x : {-0.5, 0.0, 0.5}) {
+        eye_ = test::look_from({x, 0, 1.0}, yaw_rad, 0.15);
+        look(room_with({}));
+      }
+    }
+    if (round == 0) after_once = free_.block_count();
+  }
+  ASSERT_GT(after_once, 10u);
+  EXPECT_EQ(free_.block_count(), after_once);
+  // At most the blocks of the box around all that was in view: 4 m deep, to both sides, high and
+  // low.
+  const double block_m = 8.0 * kCell_m;
+  const double around = (9.0 / block_m + 2) * (4.0 / block_m + 2) * (6.0 / block_m + 2);
+  EXPECT_LT(static_cast<double>(after_once), around);
+}
+
 }  // namespace
 }  // namespace pocd

@@ -378,5 +378,24 @@ TEST(PipelineChanges, EventsNameFrameAndRobot) {
   EXPECT_EQ(drive.object_at(-0.6, 2.3)->last_robot, "r7");
 }
 
+// Below a tenth of a square metre. A thing that is in its place is known to be, however small it
+// is: one that came before it went is another one.
+TEST(PipelineChanges, ASmallThingIsNotMovedToALikeOneThatCameBefore) {
+  const Eigen::Vector3d small(0.18, 0.18, 0.2);
+  const SceneObject first = solid(kBoxClass, {-0.5, 1.6}, small);
+  const SceneObject second = solid(kBoxClass, {0.3, 1.6}, small);
+  Drive drive;
+  drive.watch(room_with({first}), kLearn);
+  const auto known = drive.object_at(-0.5, 1.6);
+  ASSERT_TRUE(known);
+  drive.watch(room_with({first, second}), kLearn);
+  ASSERT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << text(drive.events());
+  drive.watch(room_with({second}), 2 * kLearn);
+  EXPECT_TRUE(drive.of_kind(EventKind::kMoved).empty()) << text(drive.events());
+  const auto removed = drive.of_kind(EventKind::kRemoved);
+  ASSERT_EQ(removed.size(), 1u) << text(drive.events());
+  EXPECT_EQ(removed[0].object, known->id);
+}
+
 }  // namespace
 }  // namespace pocd

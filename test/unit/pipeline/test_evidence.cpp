@@ -1,14 +1,15 @@
 // Every published transition of a belief can be recomputed from its evidence alone.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "pocd/belief/bayesian_update.hpp"
 #include "pocd/pipeline/pocd_pipeline.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
+#include "pocd/track/rules.hpp"
 #include "test_room.hpp"
 
 namespace pocd {
@@ -36,10 +37,10 @@ bool rule_holds(const ObjectEvent& event, const PipelineConfig& config) {
     return e.after.stationarity() < config.state.remove_below;
   if (e.rule == "aligned_elsewhere") return event.kind == EventKind::kMoved && e.after.mu == 0.0;
   // What is left or taken away of a surface, or who is who, is no matter of the belief.
-  const std::set<std::string> others{
-      "nothing_left", "part_seen_through", "part_removed", "grew",
-      "found_again",  "unknown",           "found",        "arrived"};
-  return others.count(e.rule) > 0 || e.rule.rfind("joined_", 0) == 0;
+  const auto rule = rule_of(e.rule);
+  if (!rule) return false;
+  const auto& told_by = all_rules()[static_cast<std::size_t>(*rule)].events;
+  return std::find(told_by.begin(), told_by.end(), event.kind) != told_by.end();
 }
 
 /// Drive of two visits through the hall, at half the resolution and half the rate, between which

@@ -25,9 +25,9 @@ Blocks blocks_of(const TsdfMap& map) {
 }
 
 struct Cleared {
-  int voxels = 0;       ///< surface that was lost in one frame
-  int of_others = 0;    ///< of these: of an object that no event of the frame is about
-  int measured = 0;     ///< of these: where the frame measured a surface
+  int voxels = 0;     ///< surface that was lost in one frame
+  int of_others = 0;  ///< of these: of an object that no event of the frame is about
+  int measured = 0;   ///< of these: where the frame measured a surface
 };
 
 /// Compares the map before and after a frame. Fusion never takes more than three quarters of a
@@ -72,17 +72,97 @@ Cleared cleared_by(const Frame& frame, const FrameResult& result, const Blocks& 
   return cleared;
 }
 
+/// What each known piece of surface was last seen to be, by looks of the camera alone.
+class Witness {
+ public:
+  /// Takes in a frame, with the map before it.
+  void look(const Frame& frame, const Blocks& before, double voxel_m) {
+    ++frame_;
+    const Pose T_C_W = frame.T_W_C.inverse();
+    for (const auto& [key, block] : before) {
+      for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+        if (block.weight[v] < kKnown || std::abs(block.tsdf[v]) > kNearSurface) continue;
+        Seen& seen = seen_[{key, v}];
+        const Eigen::Vector3d p = T_C_W * centre(key, v, voxel_m);
+        if (p.z() < 0.2) continue;
+        const auto u = std::lround(frame.camera.fx * p.x() / p.z() + frame.camera.cx);
+        const auto w = std::lround(frame.camera.fy * p.y() / p.z() + frame.camera.cy);
+        if (u < 2 || w < 2 || u >= frame.camera.width - 2 || w >= frame.camera.height - 2) continue;
+        bool measured = true;
+        for (int n = 0; n < 9; ++n) {
+          const float depth = frame.depth_m.at<float>(static_cast<int>(w) + 2 * (n / 3) - 2,
+                                                      static_cast<int>(u) + 2 * (n % 3) - 2);
+          measured &= depth > 0.0f && std::abs(depth - p.z()) < 1.5 * voxel_m;
+        }
+        // At an outline either may be right.
+        const float middle = frame.depth_m.at<float>(static_cast<int>(w), static_cast<int>(u));
+        const bool through = middle > p.z() + 1.5 * voxel_m;
+        if (measured) seen.measured = frame_;
+        if (through) seen.through = frame_;
+      }
+    }
+  }
+  /// Of the surface that was lost in this frame: what was measured within the last looks and not
+  /// seen through since; and pieces of which nothing was ever seen through. A piece's parts are no
+  /// farther apart than a thing is thick.
+  std::pair<int, int> standing_and_untouched(const Blocks& before, const TsdfMap& map,
+                                             double thick_m) const {
+    const double voxel_m = map.config().voxel_size_m;
+    std::vector<Eigen::Vector3d> gone, unseen;
+    int standing = 0;
+    for (const auto& [key, old] : before) {
+      const VoxelBlock* now = map.find(key);
+      for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+        if (old.weight[v] < kKnown || std::abs(old.tsdf[v]) > kNearSurface) continue;
+        if (now && now->weight[v] > 1) continue;
+        const auto at = seen_.find({key, v});
+        const Seen seen = at == seen_.end() ? Seen() : at->second;
+        if (seen.through > 0 && seen.through >= seen.measured) {
+          gone.push_back(centre(key, v, voxel_m));
+        } else {
+          standing += seen.measured > 0 && frame_ - seen.measured < kLately;
+          unseen.push_back(centre(key, v, voxel_m));
+        }
+      }
+    }
+    const auto untouched = std::count_if(unseen.begin(), unseen.end(), [&](const auto& p) {
+      return std::none_of(gone.begin(), gone.end(),
+                          [&](const auto& q) { return (p - q).norm() < thick_m; });
+    });
+    return {standing, static_cast<int>(untouched)};
+  }
+
+ private:
+  static constexpr int kKnown = 8, kNearSurface = 16384, kLately = 3;
+  static Eigen::Vector3d centre(const BlockKey& key, int v, double voxel_m) {
+    return Eigen::Vector3d(8 * key.x + (v & 7) + 0.5, 8 * key.y + (v >> 3 & 7) + 0.5,
+                           8 * key.z + (v >> 6) + 0.5) *
+           voxel_m;
+  }
+  struct Seen {
+    int measured = 0, through = 0;  ///< last frame; 0: never
+  };
+  std::map<std::pair<BlockKey, int>, Seen> seen_;
+  int frame_ = 0;
+};
+
 struct Totals {
   int removed = 0, moved = 0, cleared = 0;
 };
 
+/// No thing of the room is larger from end to end.
+constexpr double kThick_m = 1.2;
+
 /// One frame of a drive with all that must hold after it.
-void expect_within_evidence(PocdPipeline& pipeline, const Frame& frame, Totals& totals) {
+void expect_within_evidence(PocdPipeline& pipeline, const Frame& frame, Totals& totals,
+                            Witness* witness = nullptr) {
   const Blocks before = blocks_of(pipeline.map());
+  if (witness) witness->look(frame, before, pipeline.map().config().voxel_size_m);
   const FrameResult result = pipeline.process_frame(frame);
   const Cleared cleared = cleared_by(frame, result, before, pipeline.map());
   totals.cleared += cleared.voxels;
-  const std::string where = "frame " + std::to_string(frame.sequence) + "\n" + test::text(result.events);
+  const std::string where =
+      "frame " + std::to_string(frame.sequence) + "\n" + test::text(result.events);
   EXPECT_EQ(cleared.of_others, 0) << where;
   std::set<ObjectId> there;
   for (const ObjectSnapshot& o : pipeline.objects()) there.insert(o.id);
@@ -104,6 +184,12 @@ void expect_within_evidence(PocdPipeline& pipeline, const Frame& frame, Totals& 
   // A pushed thing takes all of its voxels with it.
   if (!realigned) {
     EXPECT_EQ(cleared.measured, 0) << where;
+    if (witness && cleared.voxels > 0) {
+      const auto [standing, untouched] =
+          witness->standing_and_untouched(before, pipeline.map(), kThick_m);
+      EXPECT_EQ(standing, 0) << "of " << cleared.voxels << " in " << where;
+      EXPECT_EQ(untouched, 0) << "of " << cleared.voxels << " in " << where;
+    }
   }
   // Nobody owns voxels who is not known, but for candidates, which have ids of their own.
   for (const ObjectId id : result.retired) {
@@ -142,18 +228,19 @@ TEST(Invariants, AnActIsNoLargerThanItsEvidenceInTheRoom) {
     Random random(seed);
     const PipelineConfig config = test::room_config();
     test::Drive drive(config);
+    Witness witness;
     std::vector<SceneObject> things;
     for (int k = 0; k < 3; ++k) {
-      things.push_back(solid(random.below(2) ? kBoxClass : kCageClass,
-                             {-0.8 + 0.8 * k + random.uniform(-0.1, 0.1), random.uniform(2.0, 2.7)},
-                             {random.uniform(0.25, 0.5), random.uniform(0.25, 0.5),
-                              random.uniform(0.4, 1.0)},
-                             random.uniform(-0.8, 0.8)));
+      things.push_back(
+          solid(random.below(2) ? kBoxClass : kCageClass,
+                {-0.8 + 0.8 * k + random.uniform(-0.1, 0.1), random.uniform(2.0, 2.7)},
+                {random.uniform(0.25, 0.5), random.uniform(0.25, 0.5), random.uniform(0.4, 1.0)},
+                random.uniform(-0.8, 0.8)));
     }
     const auto watch = [&](int frames) {
       for (int i = 0; i < frames; ++i) {
         Frame frame = drive.next_frame(room_with(things));
-        expect_within_evidence(drive.pipeline(), frame, totals);
+        expect_within_evidence(drive.pipeline(), frame, totals, &witness);
       }
     };
     watch(20);
@@ -177,11 +264,11 @@ TEST(Invariants, AStillSceneHasNoRemovalsAndNoMoves) {
     Random random(40 + seed);
     std::vector<SceneObject> things;
     for (int k = 0; k < 4; ++k) {
-      things.push_back(solid(random.below(2) ? kBoxClass : kCageClass,
-                             {-0.9 + 0.6 * k + random.uniform(-0.1, 0.1), random.uniform(1.8, 2.9)},
-                             {random.uniform(0.2, 0.5), random.uniform(0.2, 0.5),
-                              random.uniform(0.3, 1.1)},
-                             random.uniform(-0.8, 0.8)));
+      things.push_back(
+          solid(random.below(2) ? kBoxClass : kCageClass,
+                {-0.9 + 0.6 * k + random.uniform(-0.1, 0.1), random.uniform(1.8, 2.9)},
+                {random.uniform(0.2, 0.5), random.uniform(0.2, 0.5), random.uniform(0.3, 1.1)},
+                random.uniform(-0.8, 0.8)));
     }
     const Scene scene = room_with(things);
     const PipelineConfig config = test::room_config();

@@ -1,6 +1,7 @@
 // Several robots look at the same objects: nothing counts twice, and it is known who saw what.
 #include <gtest/gtest.h>
 
+#include "../../../pocd_core/src/pipeline/robot_notes.hpp"
 #include "drive.hpp"
 
 namespace pocd {
@@ -110,6 +111,57 @@ TEST(TwoRobots, WhoSawItIsKnown) {
   ASSERT_FALSE(crowd.events.empty());
   EXPECT_EQ(crowd.events[0].kind, EventKind::kAdded);
   EXPECT_FALSE(crowd.events[0].robot.empty());
+}
+
+/// A robot in the room, and one in a room like it a storey higher.
+class TwoStoreys : public ::testing::Test {
+ protected:
+  static constexpr double kStorey_m = 1.5;
+  FrameResult look(const std::string& robot, const Scene& scene, bool floor_in_view = true) {
+    const bool up = robot == "up";
+    Scene there = scene;
+    const Eigen::Vector3d off(up ? 30.0 : 0.0, 0.0, up ? kStorey_m : 0.0);
+    for (SceneObject& object : there.objects) object.T_W_O.pretranslate(off);
+    Pose eye = test::swaying_camera(count_);
+    eye.pretranslate(off);
+    Frame frame = test::shoot(there, eye, count_);
+    test::add_noise(frame, DepthNoise(), 7);
+    if (!floor_in_view) frame.depth_m.setTo(0.0f, frame.labels == test::kFloorClass);
+    frame.robot = robot;
+    frame.stamp_ns += up ? 30'000'000 : 0;
+    return pipeline_.process_frame(frame);
+  }
+  void look_both(const Scene& scene, int times) {
+    for (int i = 0; i < times; ++i, ++count_) look("down", scene), look("up", scene);
+  }
+
+  PocdPipeline pipeline_{test::room_config()};
+  std::uint64_t count_ = 0;
+};
+
+TEST_F(TwoStoreys, EachRobotHasAGroundOfItsOwn) {
+  look_both(room_with({kBox}), 10);
+  ASSERT_EQ(pipeline_.objects().size(), 2u);
+  for (const ObjectSnapshot& o : pipeline_.objects()) {
+    const double floor_m = o.box.pose.position_W.x() > 15.0 ? kStorey_m : 0.0;
+    EXPECT_NEAR(o.box.pose.position_W.z() - 0.5 * o.box.size_m.z(), floor_m, 0.05);
+  }
+  // Without the floor in view each goes by what it knows of its own: by the upper one's all that
+  // the lower one sees would be ground.
+  const SceneObject another = solid(kBoxClass, {0.7, 2.0}, {0.4, 0.4, 0.6});
+  for (int i = 0; i < 15; ++i, ++count_) {
+    look("up", room_with({kBox}));
+    look("down", room_with({kBox, another}), false);
+  }
+  EXPECT_EQ(pipeline_.objects().size(), 3u);
+}
+
+TEST(Grounds, AreBoundedThoughNamesAreMany) {
+  Grounds grounds;
+  for (std::size_t i = 0; i < PoseGate::kMostRobots + 20; ++i) {
+    grounds.of("name" + std::to_string(i));
+    ASSERT_LE(grounds.size(), PoseGate::kMostRobots);
+  }
 }
 
 }  // namespace

@@ -63,8 +63,9 @@ struct LibraryObject {
   int looks_unobserved = 0;         ///< in a row: its place was seen empty
   StampNs unobserved_since_ns = 0;  ///< the first of them
   int looks_displaced = 0;  ///< found it beside its place, since one found it there uncontested
-  int looks_losing = 0;     ///< in a row: a part of it is seen through
-  std::size_t lost = 0;     ///< points eroded since the last event
+  StampNs displaced_since_ns = 0;  ///< the first of them
+  int looks_losing = 0;            ///< in a row: a part of it is seen through
+  std::size_t lost = 0;            ///< points eroded since the last event
   /// Objects seen in one piece with it: in how many looks, or kToldApart.
   std::map<ObjectId, int> companions;
   static constexpr int kToldApart = -1;  ///< masks showed them as two things

@@ -33,7 +33,8 @@ struct PartsConfig {
 /// where nothing was before belongs to an object that arrived and that it touches, or is something
 /// new; another one belongs to the object in place that it touches, or is something new. Objects
 /// and observations belong together only if classes agree and, where masks carry instances, no
-/// object is in two of them.
+/// object is in two of them. What has no class (kThing) may lie on any object, which grows by it
+/// only within its box.
 std::vector<Part> divide(const Observations& observations, Look* looks, std::size_t count,
                          const SeenEmpty& seen_empty, const PartsConfig& config);
 

@@ -31,6 +31,6 @@ std::uint64_t piece_key(const BlockKey& key);
 BlockKey block_key(std::uint64_t piece_key);
 
 /// Number of the layout of all pieces: another one is another layout.
-constexpr int kPiecesVersion = 4;
+constexpr int kPiecesVersion = 5;
 
 }  // namespace pocd
