@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
 
 namespace pocd::dds {
 
@@ -24,18 +23,18 @@ class RejoinPlan {
   /// now.
   bool due(Time now, Duration silence) {
     if (silence < kFirst) {
-      next_.reset();
+      next_ = Time::min();
       wait_ = kFirst;
       return false;
     }
-    if (next_ && now < *next_) return false;
+    if (now < next_) return false;
     next_ = now + wait_;
     wait_ = std::min<Duration>(2 * wait_, kMost);
     return true;
   }
 
  private:
-  std::optional<Time> next_;
+  Time next_ = Time::min();
   Duration wait_ = kFirst;
 };
 

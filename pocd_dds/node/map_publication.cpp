@@ -103,7 +103,9 @@ void MapPublication::send_step(std::optional<MapDelta> step, StampNs stamp_ns) {
 
 void MapPublication::send_waiting() {
   const auto time = std::chrono::steady_clock::now();
-  while (budget_.open(time) && (send_delta() || send_tile() || send_reply()) &&
+  // What changed now, then what somebody waits for, then what is kept for late joiners.
+  while (budget_.open(time) &&
+         (send_delta() || send_tile(tiles_waiting_) || send_reply() || send_tile(kept_waiting_)) &&
          std::chrono::steady_clock::now() - time < kLongestTurn) {
   }
 }
@@ -127,9 +129,8 @@ bool MapPublication::send_delta() {
   return true;
 }
 
-bool MapPublication::send_tile() {
+bool MapPublication::send_tile(std::deque<TileKey>& queue) {
   std::unique_lock<std::mutex> lock(mutex_);
-  std::deque<TileKey>& queue = tiles_waiting_.empty() ? kept_waiting_ : tiles_waiting_;
   if (queue.empty()) return false;
   const TileKey key = queue.front();
   const auto known = publisher_.tiles().find(key);

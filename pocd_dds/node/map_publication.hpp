@@ -82,7 +82,7 @@ class MapPublication {
 
  private:
   bool send_delta();
-  bool send_tile();
+  bool send_tile(std::deque<TileKey>& queue);
   bool send_reply();
 
   struct Announced {

@@ -173,6 +173,55 @@ TEST(MapBus, ATurnEndsHoweverMuchIsWaiting) {
   }));
 }
 
+// A node that goes on with a memory writes all of it for late joiners. Who asks for it does not
+// wait until that is done.
+TEST(MapBus, WhoAsksGoesBeforeWhatIsKept) {
+  constexpr int kSide = 40;  // blocks
+  const TestDomain domain;
+  MapSource source(domain, 6, 100.0);
+  for (int x = 0; x < kSide; ++x) {
+    for (int y = 0; y < kSide; ++y) fill_block(source.map, {x, y, 0}, source.random);
+  }
+  source.publish();
+  ASSERT_TRUE(eventually([&] {
+    source.turn();
+    return source.publication.waiting() == 0;
+  }));
+  const auto subscriber = test_participant(domain);
+  dds::Wakeup wakeup;
+  dds::Reader<pocd_msgs::msg::MapSnapshotReplyPubSubType> replies(
+      subscriber, dds::topics::kSnapshotReply, wakeup);
+  dds::Writer<pocd_msgs::msg::MapSnapshotRequestPubSubType> requests(subscriber,
+                                                                     dds::topics::kSnapshotRequest);
+  pocd_msgs::msg::MapSnapshotRequest request;
+  pocd_msgs::msg::MapSnapshotReply reply;
+  dds::SampleMeta meta;
+  // The first answer shows that each side knows the other.
+  ASSERT_TRUE(eventually([&] {
+    if (source.publication.traffic().snapshots == 0) requests.write(request);
+    source.turn();
+    return replies.take(reply, meta);
+  }));
+  ASSERT_TRUE(eventually([&] {
+    source.turn();
+    while (replies.take(reply, meta)) {
+    }
+    return source.publication.waiting() == 0;
+  }));
+  source.publication.restored(1);
+  const std::size_t kept = source.publication.waiting();
+  ASSERT_EQ(kept, kSide * kSide / 4u);
+  const std::uint64_t before = source.publication.traffic().snapshot_bytes;
+  requests.write(request);
+  ASSERT_TRUE(eventually([&] {
+    source.publication.answer_requests();
+    return source.publication.waiting() > kept;
+  }));
+  source.publication.send_waiting();
+  EXPECT_GT(source.publication.traffic().snapshot_bytes, before);
+  EXPECT_GE(source.publication.waiting(), kept) << "what is kept went first";
+}
+
 TEST(ByteBudget, SpendsItsRateAndSavesLittle) {
   using std::chrono::milliseconds;
   dds::ByteBudget budget(1e6);
