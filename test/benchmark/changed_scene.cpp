@@ -482,10 +482,14 @@ class SceneMaker {
 
 int main(int argc, char** argv) {
   const std::string kind = argc > 1 ? argv[1] : "";
-  if ((kind != "circuit" || argc < 4) && (kind != "warehouse" || argc != 5)) {
-    std::cerr << "usage: pocd_changed_scene circuit SEED OUTPUT_DIR\n"
-                 "       pocd_changed_scene warehouse SEED OUTPUT_DIR MESH_DIR\n";
-    return 2;
+  const bool help = kind == "--help" || kind == "-h";
+  if (help || ((kind != "circuit" || argc < 4) && (kind != "warehouse" || argc != 5))) {
+    (help ? std::cout : std::cerr)
+        << "Makes two laps through a place of random layout in which things change.\n"
+           "usage: pocd_changed_scene circuit SEED OUTPUT_DIR\n"
+           "       pocd_changed_scene warehouse SEED OUTPUT_DIR MESH_DIR\n"
+           "Exit code: 0 done, 1 inputs or outputs unusable, 2 usage.\n";
+    return help ? 0 : 2;
   }
   try {
     const SceneMaker scene(kind == "warehouse", std::stoull(argv[2]), argc > 4 ? argv[4] : "");
