@@ -177,6 +177,7 @@ void MapMirror::Impl::join_anew_if_deaf() {
   std::unique_ptr<MapMirrorBus> other = join(bus->participant);
   const std::lock_guard<std::mutex> lock(mutex);
   if (bus->tiles) stop_gathering();
+  objects.begin_anew();
   bus.swap(other);
 }
 

@@ -17,7 +17,7 @@ bool is_of(const msg::ObjectState& object, const msg::MapManifest* manifest) {
 template <class Objects, class Condition>
 void erase_if(Objects& objects, const Condition& condition) {
   for (auto object = objects.begin(); object != objects.end();) {
-    object = condition(object->second) ? objects.erase(object) : std::next(object);
+    object = condition(*object) ? objects.erase(object) : std::next(object);
   }
 }
 
@@ -27,6 +27,7 @@ void ObjectCopy::take(Reader<msg::ObjectStatePubSubType>& reader, int most) {
   reader.take_some(most, [&](const msg::ObjectState& state, const SampleMeta& meta) {
     if (meta.valid) {
       if (state.map_id() != map_id_) return;
+      heard_before_.erase(state.uuid());
       if (state.forgotten()) {
         objects_.erase(state.uuid());
       } else {
@@ -40,16 +41,24 @@ void ObjectCopy::take(Reader<msg::ObjectStatePubSubType>& reader, int most) {
 
 void ObjectCopy::settle(const msg::MapManifest& manifest) {
   if (epoch_ != 0 && epoch_ != manifest.epoch() && lineage_ != manifest.lineage()) {
-    erase_if(objects_, [&](const auto& object) { return object.epoch() == epoch_; });
+    erase_if(objects_, [&](const auto& entry) { return entry.second.epoch() == epoch_; });
   }
   epoch_ = manifest.epoch();
   lineage_ = manifest.lineage();
   std::size_t told = 0;
-  for (const auto& entry : objects_) told += entry.second.epoch() == epoch_;
+  const auto is_told = [&](const auto& entry) {
+    return entry.second.epoch() == epoch_ && heard_before_.count(entry.first) == 0;
+  };
+  for (const auto& entry : objects_) told += is_told(entry);
   if (told == objects_.size() || told < manifest.object_count()) return;
-  erase_if(objects_, [&](const auto& object) {
-    return object.lineage() == lineage_ && object.epoch() != epoch_;
+  erase_if(objects_, [&](const auto& entry) {
+    return entry.second.lineage() == lineage_ && !is_told(entry);
   });
+  heard_before_.clear();
+}
+
+void ObjectCopy::begin_anew() {
+  for (const auto& entry : objects_) heard_before_.insert(entry.first);
 }
 
 std::size_t ObjectCopy::count(const msg::MapManifest* manifest) const {
