@@ -24,7 +24,9 @@ struct Options {
 };
 
 std::string describe(const pocd::MirrorStatus& status) {
-  return status.in_step ? "in step with publisher" : "stale, because " + status.stale_because;
+  if (!status.in_step) return "stale, because " + status.stale_because;
+  return status.final_version ? "in step with publisher, which has ended its run"
+                              : "in step with publisher";
 }
 
 void print(const pocd::MirrorStatus& status) {

@@ -18,6 +18,7 @@
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/bus_log.hpp"
 #include "pocd_dds/entities/idl_version.hpp"
+#include "pocd_dds/entities/shared_memory.hpp"
 #include "pocd_dds/entities/socket_buffers.hpp"
 #include "pocd_dds/entities/type_watch.hpp"
 
@@ -265,6 +266,7 @@ Participant::Participant(const BusOptions& options)
   } else {
     warn_of_profile(qos);
   }
+  make_shared_memory_last(qos);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   if (discovery.leaseDuration ==
       DomainParticipantQos().wire_protocol().builtin.discovery_config.leaseDuration) {
