@@ -130,17 +130,24 @@ TEST(SharedMemory, AReceiverWhosePortWasMadeAnewByOthersListensThere) {
   EXPECT_TRUE(eventually([&] { return watch.publisher_present(); })) << node.err();
 }
 
+/// The node with so much of shared memory for it and what else the command starts.
+std::vector<std::string> with_room(const std::string& size, const std::string& script,
+                                   const TestDomain& domain) {
+  std::vector<std::string> command{
+      "/usr/bin/unshare",
+      "--mount",
+      "/bin/bash",
+      "-c",
+      "mount -t tmpfs -o size=" + size + " small /dev/shm && " + script,
+      "-"};
+  for (const std::string& word : node_command(domain)) command.push_back(word);
+  return command;
+}
+
 TEST(SharedMemory, ATooSmallOneIsNotUsedAndNobodyDies) {
   if (!own_shared_memory().empty()) GTEST_SKIP() << own_shared_memory();
   const TestDomain domain;
-  std::vector<std::string> command{"/usr/bin/unshare",
-                                   "--mount",
-                                   "/bin/sh",
-                                   "-c",
-                                   "mount -t tmpfs -o size=24m small /dev/shm && exec \"$@\"",
-                                   "-"};
-  for (const std::string& word : node_command(domain)) command.push_back(word);
-  Process node(command);
+  Process node(with_room("24m", "exec \"$@\"", domain));
   const CommandResult health =
       run_command({bin("pocd_health"), "--ready", "--timeout", "60", "--domain", domain.text()});
   EXPECT_EQ(health.exit_code, 0) << health.out << health.err;
@@ -149,6 +156,24 @@ TEST(SharedMemory, ATooSmallOneIsNotUsedAndNobodyDies) {
   EXPECT_EQ(ended.exit_code, 0);
   EXPECT_EQ(count_of(ended.err, "/dev/shm has 24 MiB free, shared memory needs 33 MiB"), 1u)
       << ended.err;
+}
+
+TEST(SharedMemory, RoomForOneIsNotTakenByTwoThatStartAtOnce) {
+  if (!own_shared_memory().empty()) GTEST_SKIP() << own_shared_memory();
+  const TestDomain domain;
+  Process nodes(with_room("40m",
+                          "for i in 1 2 3 4; do \"$@\" --set node.map_id=$i & done; "
+                          "trap 'kill -INT $(jobs -p)' INT; code=0; "
+                          "for job in $(jobs -p); do "
+                          "while kill -0 $job 2>/dev/null; do wait $job; last=$?; done; "
+                          "[ $last = 0 ] || code=$last; done; exit $code",
+                          domain));
+  EXPECT_TRUE(eventually(
+      [&] { return count_of(nodes.err(), "running on domain") == 4 || !nodes.running(); }));
+  nodes.signal(SIGINT);
+  const CommandResult ended = nodes.wait();
+  EXPECT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_EQ(count_of(ended.err, "free, shared memory needs 33 MiB"), 3u) << ended.err;
 }
 
 }  // namespace
