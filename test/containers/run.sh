@@ -235,7 +235,9 @@ sys.stdout.buffer.write(struct.pack("<2I11d", 32, 24, 30, 30, 16, 12, 0, 0, 0, .
       /peer/cyclone_peer "$domain" /peer/frames /tmp/log
     until_said peer "sent 0 frames"
   fi
-  box play --network "$network" "${play[@]/two_drives/${with_peer:+nine}${with_peer:-two_drives}}"
+  local drives=two_drives
+  [[ -z $with_peer ]] || drives=nine
+  box play --network "$network" "${play[@]/two_drives/$drives}"
   ended play
   stop node
   ended mirror
