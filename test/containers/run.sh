@@ -9,7 +9,7 @@
 #            what concerns the image itself is skipped
 #   --peer   the program cyclone_peer of build.sh --tests; default: build/pocd_test/peers/cyclone_peer
 #   --keep   leaves the image for the next run with --image pocd-test
-# Cases: image host private_shm bridge hardened killed cut site_test; default: all.
+# Cases: image packages host private_shm bridge hardened killed cut site_test; default: all.
 # The last line is "N passed, N failed, N skipped"; the exit code is 0 when none failed.
 set -euo pipefail
 source=$(realpath "$(dirname "$0")/../..")
@@ -27,7 +27,7 @@ while [[ $# -gt 0 ]]; do
   esac
   shift
 done
-((${#cases[@]} > 0)) || cases=(image host private_shm bridge hardened killed cut site_test)
+((${#cases[@]} > 0)) || cases=(image packages host private_shm bridge hardened killed cut site_test)
 
 work=$(mktemp -d)
 run=pocd-test-$$
@@ -192,6 +192,39 @@ case_image() {
   [[ $depends == *libfastrtps*libstdc++6* ]] || { echo "the package names no libraries" >&2 && return 1; }
   user=$(podman run --rm "${limits[@]}" --network none --entrypoint id "$image" -u)
   [[ $user != 0 ]] || { echo "it runs as root" >&2 && return 1; }
+}
+case_packages() { # on a Debian 12 with nothing else, and with the small /dev/shm that a container has by default
+  local folder=${packages:-$source/output/packages}
+  ls "$folder"/pocd_*.deb >/dev/null 2>&1 || skip "no packages in $folder (launch_scripts/package.sh)"
+  cat >"$site/packages.sh" <<'TEXT'
+set -e
+step() { echo "package: $*"; }
+apt-get update >/dev/null
+apt-get install -y --no-install-recommends /packages/pocd_*.deb /packages/pocd-tools_*.deb >/tmp/log 2>&1 || { cat /tmp/log; exit 1; }
+for program in $(dpkg -L pocd pocd-tools | grep '^/usr/bin/pocd_'); do "$program" --help >/dev/null; done
+step "$(dpkg -L pocd pocd-tools | grep -c '^/usr/bin/pocd_') programs run; /dev/shm has $(df -m --output=size /dev/shm | tail -n 1 | tr -d ' ') MB"
+pocd_node --config /etc/pocd/classes.yaml --config /etc/pocd/site.yaml --dump >/dev/null
+step "its configuration is one"
+pocd_node --config /usr/share/pocd/config/simulated.yaml --lossless &
+node=$!
+pocd_health --ready --timeout 60
+pocd_mirror --until-end --timeout 300 &
+mirror=$!
+pocd_play --dataset sim --input /usr/share/pocd/config/sim/demo.yaml --no-color --fast --lossless --max-frames 100
+kill -INT "$node"
+wait "$node"
+wait "$mirror"
+step "a map came over the bus"
+apt-get purge -y pocd pocd-tools >/dev/null 2>&1
+step "removed, $(ls /usr/bin/pocd_* /etc/pocd 2>/dev/null | wc -l) files left"
+[ ! -e /usr/bin/pocd_node ] && [ ! -e /etc/pocd/site.yaml ]
+TEXT
+  chmod a+r "$site/packages.sh"
+  podman run -d --name "$run-packages" "${limits[@]}" --network host -e "ROS_DOMAIN_ID=$domain" \
+    -e FASTRTPS_DEFAULT_PROFILES_FILE=/site/loopback.xml -v "$site:/site:ro" -v "$folder:/packages:ro" \
+    debian:12 bash /site/packages.sh >/dev/null
+  ended packages
+  said packages | grep '^package: '
 }
 case_host() { # as the compose file has it
   whole_run --network host --ipc host -e FASTRTPS_DEFAULT_PROFILES_FILE=/site/loopback.xml
