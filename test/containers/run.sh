@@ -9,12 +9,12 @@
 #            what concerns the image itself is skipped
 #   --peer   the program cyclone_peer of build.sh --tests; default: build/pocd_test/peers/cyclone_peer
 #   --keep   leaves the image for the next run with --image pocd-test
-# Cases: image packages host private_shm bridge hardened killed cut site_test; default: all.
+# Cases: image packages host private_shm bridge hardened killed cut compose site_test; default: all.
 # The last line is "N passed, N failed, N skipped"; the exit code is 0 when none failed.
 set -euo pipefail
 source=$(realpath "$(dirname "$0")/../..")
 
-image="" packages="" here="" keep="" peer=$source/build/pocd_test/peers/cyclone_peer cases=()
+image="" packages="" here="" keep="" built="" peer=$source/build/pocd_test/peers/cyclone_peer cases=()
 while [[ $# -gt 0 ]]; do
   case "$1" in
     --image) shift && image=${1:?--image needs a name} ;;
@@ -27,7 +27,7 @@ while [[ $# -gt 0 ]]; do
   esac
   shift
 done
-((${#cases[@]} > 0)) || cases=(image packages host private_shm bridge hardened killed cut site_test)
+((${#cases[@]} > 0)) || cases=(image packages host private_shm bridge hardened killed cut compose site_test)
 
 work=$(mktemp -d)
 run=pocd-test-$$
@@ -39,7 +39,7 @@ skip() { # of a case: why
   echo "$*" >"$work/skip"
   exit 1
 }
-podman() { command podman --runtime runc "$@"; }
+podman() { command podman --log-level fatal --runtime runc "$@"; }
 limits=(--ulimit nofile=20000:20000 --ulimit nproc=1024:1024)
 
 cleanup() {
@@ -81,7 +81,7 @@ if [[ -n $here ]]; then
   of_here=(-v /usr:/usr:ro -v /etc/alternatives:/etc/alternatives:ro -v "$source/install/bin:/opt/pocd:ro"
     -e PATH=/opt/pocd:/usr/bin:/bin -e SKIP_DEFAULT_XML=1 -e POCD_HEALTH_SOCKET=/tmp/pocd_health --user 12346:12346)
 elif [[ -z $image ]]; then
-  image=pocd-test
+  image=pocd-test built=yes
   dockerfile=$source/launch_scripts/Dockerfile context=$source
   if [[ -n $packages ]]; then
     context=$work/context dockerfile=$work/Dockerfile
@@ -337,6 +337,38 @@ case_cut() { # a subscriber whose network is cut falls behind, says so, and catc
   stop mirror
   [[ $(said mirror | digest_of_text) == "$expected" ]] || { echo "the map is another one" >&2 && return 1; }
 }
+case_compose() { # the compose file of a deployment: up, healthy, killed, up again, down
+  [[ -z $here ]] || skip "--here has no image"
+  command -v docker-compose >/dev/null || skip "docker-compose is not installed"
+  local folder=$work/deployment name=${run}_pocd_1 service
+  mkdir -p "$folder"
+  # The image that is tested, and nothing of it leaves this host.
+  sed -e '/^    build:/,/^      dockerfile:/d' -e "s#^    image: .*#    image: $image#" \
+    -e 's#^      - memory:.*#&\n      - "'"$site"':/site:ro"#' \
+    -e 's#^    environment:#&\n      FASTRTPS_DEFAULT_PROFILES_FILE: /site/loopback.xml#' \
+    "$source/launch_scripts/compose.yaml" >"$folder/compose.yaml"
+  # docker-compose asks podman in place of Docker.
+  printf '[containers]\ndefault_ulimits = ["nofile=20000:20000", "nproc=1024:1024"]\n[engine]\nruntime = "runc"\n' \
+    >"$work/containers.conf"
+  CONTAINERS_CONF=$work/containers.conf command podman --log-level fatal system service --time 0 "unix://$work/socket" \
+    >/dev/null 2>&1 &
+  service=$!
+  # shellcheck disable=SC2064  # now: it is local
+  trap "kill $service 2>/dev/null || true" EXIT
+  until [[ -S $work/socket ]]; do sleep 0.2; done
+  compose() {
+    (cd "$folder" && DOCKER_HOST=unix://$work/socket ROS_DOMAIN_ID=$domain timeout 120 docker-compose -p "$run" "$@") \
+      >"$work/compose.log" 2>&1 || { tail -n 15 "$work/compose.log" >&2 && return 1; }
+  }
+  compose up -d
+  podman exec "$name" pocd_health --ready --timeout 60 >/dev/null
+  [[ $(podman inspect "$name" --format '{{.HostConfig.NetworkMode}}') == host ]]
+  podman healthcheck run "$name" >/dev/null
+  podman kill -s KILL "$name" >/dev/null
+  compose up -d
+  podman exec "$name" pocd_health --ready --timeout 60 >/dev/null
+  compose down --volumes
+}
 case_site_test() { # the compose file for an integrator's own tests
   [[ -z $here ]] || skip "--here has no image"
   command -v podman-compose >/dev/null || skip "podman-compose is not installed"
@@ -389,6 +421,6 @@ for case in "${cases[@]}"; do
   fi
   clear || true
 done
-[[ -n $keep || $image != pocd-test ]] || podman rmi pocd-test >/dev/null 2>&1 || true
+[[ -n $keep || -z $built ]] || podman rmi pocd-test >/dev/null 2>&1 || true
 echo "$passed passed, $failed failed, $skipped skipped"
 ((failed == 0))
