@@ -11,7 +11,7 @@ packages=(
   fastddsgen default-jre-headless fastdds-tools libfastrtps-dev libfastcdr-dev
   libsystemd-dev pkg-config prometheus-cpp-dev
   # packages and their man pages
-  dpkg-dev help2man
+  dpkg-dev file help2man
   # core
   libeigen3-dev libpcl-dev libopencv-dev libyaml-cpp-dev libspdlog-dev libcli11-dev libdlib-dev
   libpng-dev libjpeg-dev libzstd-dev liblz4-dev zlib1g-dev libxxhash-dev libsqlite3-dev libnanoflann-dev libboost-dev
