@@ -42,7 +42,8 @@ if [[ -n "$sanitizer" ]]; then
   rules=$PWD/test/support/sanitizers
   # A report ends the process with an exit code that no test takes for success.
   export TSAN_OPTIONS="suppressions=$rules/thread.supp exitcode=66 second_deadlock_stack=1"
-  export ASAN_OPTIONS="exitcode=66 detect_stack_use_after_return=1" UBSAN_OPTIONS="print_stacktrace=1"
+  # Fast DDS 2.9.1 deletes parts of each writer as their base class: nothing on a bus would end without a report.
+  export ASAN_OPTIONS="exitcode=66 detect_stack_use_after_return=1 new_delete_type_mismatch=0" UBSAN_OPTIONS="print_stacktrace=1"
   export LSAN_OPTIONS="suppressions=$rules/leak.supp print_suppressions=0"
 fi
 
