@@ -79,21 +79,24 @@ class Destinations final : public rtps::LocatorsIterator {
 struct OpenPort {
   std::uint64_t id = 0;
   Clock::time_point other_since{};
+  bool sent = false;  // something, since then
 
-  /// True when the file that was opened has had another one in its place for a while. `follows`
-  /// says whether Fast DDS has opened that one by itself.
+  /// True when the file that was opened has had another one in its place for a while, and that
+  /// matters: it is to receive, or something was sent. `follows` says whether Fast DDS has opened
+  /// that one by itself.
   template <class Follows>
-  bool replaced(std::uint32_t port, bool missing_is_replaced, const Follows& follows) {
+  bool replaced(std::uint32_t port, bool receives, const Follows& follows) {
     const std::uint64_t now_id = port_file_id(port);
-    if ((now_id == id && id != 0) || (now_id == 0 && !missing_is_replaced)) {
+    if ((now_id == id && id != 0) || (now_id == 0 && !receives)) {
       other_since = {};
+      sent = false;
       return false;
     }
     const auto now = Clock::now();
     if (other_since == Clock::time_point{}) other_since = now;
-    if (now - other_since < kPatience) return false;
+    if (now - other_since < kPatience || !(receives || sent)) return false;
     if (!follows(now_id)) return true;
-    *this = {now_id, {}};
+    *this = {now_id, {}, false};
     return false;
   }
 };
@@ -126,7 +129,7 @@ class LastingTransport final : public rtps::TransportInterface {
                         std::uint32_t size) override {
     const std::lock_guard<std::mutex> lock(input_mutex_);
     if (!receiving_->OpenInputChannel(locator, receiver, size)) return false;
-    inputs_.push_back({locator, receiver, size, {port_file_id(locator.port), {}}});
+    inputs_.push_back({locator, receiver, size, {port_file_id(locator.port), {}, false}});
     return true;
   }
   bool CloseInputChannel(const rtps::Locator& locator) override {
@@ -258,10 +261,13 @@ class LastingTransport final : public rtps::TransportInterface {
         if (locator.kind != LOCATOR_KIND_SHM) continue;
         // Before it is opened: if it is replaced meanwhile, that is seen. Where there is no file,
         // nobody listens.
-        if (sending->ports.count(locator.port) == 0) {
+        const auto known = sending->ports.find(locator.port);
+        if (known != sending->ports.end()) {
+          known->second.sent |= known->second.other_since != Clock::time_point{};
+        } else {
           const std::uint64_t id = port_file_id(locator.port);
           if (id == 0) continue;
-          sending->ports[locator.port] = {id, {}};
+          sending->ports[locator.port] = {id, {}, false};
         }
         there.push_back(locator);
       }
@@ -323,7 +329,7 @@ class LastingTransport final : public rtps::TransportInterface {
         input.port = {};
         continue;
       }
-      input.port = {port_file_id(port), {}};
+      input.port = {port_file_id(port), {}, false};
     }
   }
   void close_retired() {

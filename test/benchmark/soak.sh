@@ -81,7 +81,7 @@ fail() {
   exit 1
 }
 SECONDS=0
-round=0
+round=0 still=0 frames=""
 until ((SECONDS >= 60 * minutes)); do
   # Every ten seconds something happens; what, the number of the round decides, so that two runs are alike.
   pair=$((round / 4 % 4))
@@ -107,6 +107,11 @@ until ((SECONDS >= 60 * minutes)); do
   fi
   sample >>"$output/soak.csv"
   for name in node mirror recorder; do alive "$name" || fail "$name has ended: $(tail -n 2 "$output/log/$name")"; done
+  # A node that hears nobody any more is flat, too.
+  now=$(tail -n 1 "$output/soak.csv" | cut -d, -f16)
+  [[ $now == "$frames" ]] && still=$((still + 1)) || still=0
+  frames=$now
+  ((still < 18)) || fail "the node has processed no frame for three minutes, of robots that come and go"
   round=$((round + 1))
   while ((SECONDS < 10 * round)); do sleep 1; done
 done

@@ -250,7 +250,9 @@ case_bridge() { # a network of their own, with another vendor's DDS as one more 
     with_peer=yes
     mkdir -p "$work/peer"
     cp "$peer" "$work/peer/cyclone_peer"
-    ldd "$peer" | sed -n 's/.*=> \(.*\/libddsc[^ ]*\) .*/\1/p' | xargs -r -I{} cp -L {} "$work/peer"
+    # Cyclone DDS and what it is linked with, which the image has not.
+    ldd "$peer" | sed -n 's/.*=> \(\/[^ ]*\) .*/\1/p' | grep -v '/lib\(c\|m\|dl\|rt\|pthread\|gcc_s\|stdc++\)\.so' |
+      xargs -r -I{} cp -L {} "$work/peer"
     # A camera that sends nothing: no frame follows the sizes, intrinsics and mount.
     python3 -c 'import struct, sys
 sys.stdout.buffer.write(struct.pack("<2I11d", 32, 24, 30, 30, 16, 12, 0, 0, 0, .5, .5, .5, .5))' >"$work/peer/frames"
