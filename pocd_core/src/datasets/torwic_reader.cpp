@@ -40,6 +40,15 @@ void parse_pose(const NumberedLine& line, const fs::path& file, Entry& entry) {
   entry.T_W_B.linear() = q.normalized().toRotationMatrix();
 }
 
+/// The time that a robot takes from one pose to another at kWalk_mps and kTurn_dps.
+StampNs way_ns(const Pose& from, const Pose& to) {
+  constexpr double kWalk_mps = 1.0, kTurn_dps = 90.0;
+  const double way_m = (to.translation() - from.translation()).norm();
+  const double turn_deg =
+      Eigen::AngleAxisd(from.linear().transpose() * to.linear()).angle() * 180.0 / M_PI;
+  return static_cast<StampNs>(1e9 * std::max(way_m / kWalk_mps, turn_deg / kTurn_dps));
+}
+
 class TorwicReader : public ListedReader<Entry> {
  public:
   explicit TorwicReader(const DatasetOptions& options)
@@ -113,7 +122,8 @@ class TorwicReader : public ListedReader<Entry> {
     return out;
   }
 
-  /// Appends a folder's frames; its stamps are shifted to begin a period after the last one so far.
+  /// Appends a folder's frames. Its stamps are shifted: it begins a period after the last one so
+  /// far, or when the camera can have come from there.
   void stitch(std::vector<Entry> fresh) {
     StampNs last_own_ns = -1, shift_ns = 0;
     bool first = true;
@@ -124,8 +134,12 @@ class TorwicReader : public ListedReader<Entry> {
                           std::to_string(entry.number) + " is not after the one before";
         } else {
           last_own_ns = entry.stamp_ns;
-          if (first && !entries_.empty()) shift_ns = last_stamp_ns_ + period_ns_ - entry.stamp_ns;
+          if (first && !entries_.empty()) {
+            shift_ns = last_stamp_ns_ + std::max(period_ns_, way_ns(last_T_W_B_, entry.T_W_B)) -
+                       entry.stamp_ns;
+          }
           first = false;
+          last_T_W_B_ = entry.T_W_B;
           entry.stamp_ns += shift_ns;
           last_stamp_ns_ = entry.stamp_ns;
         }
@@ -150,6 +164,7 @@ class TorwicReader : public ListedReader<Entry> {
   CameraExtrinsics extrinsics_;
   std::size_t lines_without_frame_ = 0;
   StampNs last_stamp_ns_ = 0;
+  Pose last_T_W_B_ = Pose::Identity();
 };
 
 }  // namespace

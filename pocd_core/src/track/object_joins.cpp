@@ -14,7 +14,18 @@ constexpr int kSharedPoints = 10;
 constexpr double kWithinShare = 0.9;
 /// Two objects are one when this share of the smaller one lies on the other.
 constexpr double kSameShare = 0.5;
+/// Surfels of each object of which it is asked whether they lie before the other one.
+constexpr std::size_t kCornerPoints = 60;
+
 }  // namespace
+
+bool is_before(const std::vector<const Surfel*>& surface, const Eigen::Vector3f& point_W,
+               double before_m) {
+  const auto of = std::count_if(surface.begin(), surface.end(), [&](const Surfel* s) {
+    return s->normal_W.dot(point_W - s->point_W) > static_cast<float>(before_m);
+  });
+  return 2 * static_cast<std::size_t>(of) > surface.size();
+}
 
 bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) const {
   // Two things that moved, each as a whole, are two; what arrived is no side of what stood there.
@@ -23,7 +34,27 @@ bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) c
   return a_arrived == b_arrived;
 }
 
+bool ObjectTracker::form_corner(const LibraryObject& a, const LibraryObject& b) const {
+  const auto some_of = [](const LibraryObject& object) {
+    std::vector<const Surfel*> some;
+    const auto& surfels = object.model.surfels();
+    const std::size_t step = std::max<std::size_t>(1, surfels.size() / kCornerPoints);
+    for (std::size_t i = 0; i < surfels.size(); i += step) some.push_back(&surfels[i]);
+    return some;
+  };
+  const auto of_a = some_of(a), of_b = some_of(b);
+  const auto lies_before = [&](const std::vector<const Surfel*>& points,
+                               const std::vector<const Surfel*>& surface) {
+    const auto before = std::count_if(points.begin(), points.end(), [&](const Surfel* s) {
+      return is_before(surface, s->point_W, 2.0 * contact_m());
+    });
+    return 2 * static_cast<std::size_t>(before) > points.size();
+  };
+  return lies_before(of_a, of_b) && lies_before(of_b, of_a);
+}
+
 bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) const {
+  if (form_corner(a, b)) return false;
   const bool a_less = a.model.surfels().size() < b.model.surfels().size();
   const LibraryObject& small = a_less ? a : b;
   const LibraryObject& large = a_less ? b : a;

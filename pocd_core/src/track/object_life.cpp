@@ -18,6 +18,8 @@ constexpr double kPartShare = 0.1;
 constexpr double kStandingShare = 0.15;
 /// What is found gone is an edge of what was measured on this visit up to this share of it.
 constexpr double kEdgeShare = 0.1;
+/// What lies before the surface that is gone is another wall from this share of all surfels on.
+constexpr double kOtherWallShare = 0.3;
 /// Looks in a row before a known object is taken for gone, whatever its belief.
 constexpr int kGoneLooks = 3;
 /// A candidate that was seen through in this many looks was never there, or moves.
@@ -51,6 +53,30 @@ void mark_unseen(const std::vector<Surfel>& surfels, const std::vector<std::uint
     if (!marked[i] && !standing[i]) more[i] = nearest2(gone, i) < nearest2(there, i) ? 1 : 0;
   }
   marked = more;
+}
+
+/// What nothing is known of stands when it is no part of the body that is gone: a good share of the
+/// surfels lies before most of what is gone, as the other wall of a corner does. Marks it, and
+/// returns how many it marked. `before_m`: so far before is not noise.
+std::size_t spare_other_wall(const std::vector<Surfel>& surfels,
+                             const std::vector<std::uint8_t>& gone, double before_m,
+                             std::vector<std::uint8_t>& standing) {
+  constexpr std::size_t kSample = 200;
+  std::vector<const Surfel*> some;
+  const auto count = static_cast<std::size_t>(std::count(gone.begin(), gone.end(), 1));
+  const std::size_t step = std::max<std::size_t>(1, count / kSample);
+  for (std::size_t i = 0, nth = 0; i < surfels.size(); ++i) {
+    if (gone[i] && nth++ % step == 0) some.push_back(&surfels[i]);
+  }
+  std::vector<std::size_t> before;
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    if (gone[i] || standing[i]) continue;
+    if (is_before(some, surfels[i].point_W, before_m)) before.push_back(i);
+  }
+  if (static_cast<double>(before.size()) < kOtherWallShare * static_cast<double>(surfels.size()))
+    return 0;
+  for (const std::size_t i : before) standing[i] = 1;
+  return before.size();
 }
 
 /// Size of the largest connected piece of the marked surfels.
@@ -283,6 +309,7 @@ void ObjectTracker::remove_objects(Step& step) {
       for (const std::size_t i : passed) standing[i] = 1;
       standing_count += passed.size();
     }
+    standing_count += spare_other_wall(surfels, gone, 2.0 * contact_m(), standing);
     if (static_cast<double>(standing_count) <=
         kStandingShare * static_cast<double>(standing_count + gone_count)) {
       remove(step, *object, Rule::kStationarityBelowThreshold);

@@ -90,6 +90,9 @@ class ObjectTracker {
   void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
   /// Whether what is known of two objects allows that they are one.
   bool may_be_one(const LibraryObject& a, const LibraryObject& b) const;
+  /// Whether each of two objects lies before the other one, as the walls of a corner do seen from
+  /// within: a body has no such sides.
+  bool form_corner(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects of one piece in the image are one piece of surface in the map.
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects may be sides of one body: nothing was ever seen through between them, and

@@ -47,4 +47,8 @@ std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose
 /// Share of the surfels that lie in the box, grown by `margin_m` on all sides.
 double inside_share(const std::vector<Surfel>& surfels, const OrientedBox& box, double margin_m);
 
+/// Whether the point [m, W] lies before most of the surface, by more than `before_m`.
+bool is_before(const std::vector<const Surfel*>& surface, const Eigen::Vector3f& point_W,
+               double before_m);
+
 }  // namespace pocd
