@@ -20,7 +20,7 @@ bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) 
   };
   const Eigen::Vector3d f = sorted(found), k = sorted(known);
   const auto room = [&](double x) { return x + std::max(slack_m, 0.25 * x); };
-  return f[0] <= room(k[0]) && f[1] <= room(k[0]) && f[2] <= room(k[2]);
+  return f[0] <= room(k[0]) && f[1] <= room(k[0]) && f[2] <= room(k[2]) && k[2] <= room(f[2]);
 }
 
 std::vector<Pose> likely_starts(const OrientedBox& known, const OrientedBox& found,

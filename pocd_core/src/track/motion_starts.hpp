@@ -8,8 +8,8 @@
 
 namespace pocd {
 
-/// Whether the found box [m] is no larger than the known one, up to a quarter of each side and
-/// `slack_m`; of both only a part may be known.
+/// Whether the found box [m] is no larger than the known one, and stands as high, up to a quarter
+/// of each side and `slack_m`.
 bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m);
 
 /// Motions from `found` to `known` that put their boxes' sides on each other, the likeliest ones

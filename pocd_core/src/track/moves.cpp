@@ -73,15 +73,13 @@ std::optional<Motion> ObjectTracker::explanation(const Step& step, const Departu
   if (moved_m > config_.state.relocation_reach_m || moved_m < 0.5 * config_.change.tau_m)
     return std::nullopt;
   motion.lengths = moved_m / longest_side(departure.box);
-  // What of the old surface is at the new place, and what is not: it is seen through there now, or
-  // was seen empty before. What the new thing hides may have been seen empty before it came.
+  // What of the old surface is at the new place, and what is not. What the new thing hides may have
+  // been seen empty before it came.
   const Pose T_C_W = step.cloud.T_W_C.inverse();
-  const auto is_empty = [&](const Eigen::Vector3f& point_W) {
+  const double hidden_m = config_.map.voxel_size_m;
+  const auto hidden = [&](const Eigen::Vector3f& point_W) {
     const auto view = view_of(step.cloud, T_C_W, point_W.cast<double>());
-    if (view && view->measured_m > view->depth_m + inlier_m) return true;
-    const bool hidden = view && view->measured_m > 0.0 &&
-                        view->measured_m < view->depth_m - config_.map.voxel_size_m;
-    return !hidden && free_space_.seen_empty(point_W);
+    return view && view->measured_m > 0.0 && view->measured_m < view->depth_m - hidden_m;
   };
   const Eigen::Isometry3f T = motion.T_new_old.cast<float>();
   std::size_t empty = 0, seen = 0;
@@ -89,7 +87,7 @@ std::optional<Motion> ObjectTracker::explanation(const Step& step, const Departu
     const Eigen::Vector3f there = T * s.point_W;
     if (found.model.nearest(there, static_cast<float>(inlier_m)) != ObjectModel::kNone) {
       ++seen;
-    } else if (is_empty(there)) {
+    } else if (free_space_.seen_empty(there) && !hidden(there)) {
       ++empty;
     }
   }
