@@ -63,6 +63,28 @@ TEST(TorwicReader, ReadsFramesInNumericOrder) {
   EXPECT_NEAR(frames[0].T_W_C.linear()(2, 2), 0.260, 1e-3);
 }
 
+// A second folder goes on at once; when it begins elsewhere, the camera had time to come there.
+TEST(TorwicReader, AFolderThatBeginsElsewhereLeavesTimeForTheWay) {
+  const ScratchFolder here, near, far, turned;
+  for (const ScratchFolder* folder : {&here, &near, &far, &turned}) make_sequence(*folder);
+  const auto elsewhere = [](const std::string& pose) {
+    return "0 100 0 " + pose + "\n1 100 66000000 " + pose + "\n2 100 132000000 " + pose + "\n";
+  };
+  far.write("poses.txt", elsewhere("1 4 0.1 0 0 0 1"));
+  turned.write("poses.txt", elsewhere("1 2 0.1 0 0 1 0"));
+  const auto gap_s = [&](const ScratchFolder& second) {
+    DatasetOptions options = options_for(here);
+    options.inputs.push_back(second.path());
+    const auto reader = open_dataset(options);
+    const std::vector<Frame> frames = read_all(*reader);
+    EXPECT_EQ(frames.size(), 6u);
+    return static_cast<double>(frames[3].stamp_ns - frames[2].stamp_ns) * 1e-9;
+  };
+  EXPECT_NEAR(gap_s(near), 1.0 / 15.0, 1e-6);
+  EXPECT_NEAR(gap_s(far), 2.0, 1e-6);     // 2 m at 1 m/s
+  EXPECT_NEAR(gap_s(turned), 2.0, 1e-6);  // half a turn at 90 degrees a second
+}
+
 // SLAM begins at the origin, and converted sets at stamp 0.
 TEST(TorwicReader, PoseOfIdentityAtStampZeroIsAPose) {
   const ScratchFolder folder;
