@@ -19,6 +19,18 @@ constexpr std::size_t kCornerPoints = 60;
 
 }  // namespace
 
+std::vector<const Surfel*> some_surfels(const std::vector<Surfel>& surfels,
+                                        const std::vector<std::uint8_t>& marked,
+                                        std::size_t about) {
+  const auto count = static_cast<std::size_t>(std::count(marked.begin(), marked.end(), 1));
+  const std::size_t step = std::max<std::size_t>(1, count / about);
+  std::vector<const Surfel*> some;
+  for (std::size_t i = 0, nth = 0; i < surfels.size(); ++i) {
+    if (marked[i] && nth++ % step == 0) some.push_back(&surfels[i]);
+  }
+  return some;
+}
+
 bool is_before(const std::vector<const Surfel*>& surface, const Eigen::Vector3f& point_W,
                double before_m) {
   const auto of = std::count_if(surface.begin(), surface.end(), [&](const Surfel* s) {
@@ -36,11 +48,8 @@ bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) c
 
 bool ObjectTracker::form_corner(const LibraryObject& a, const LibraryObject& b) const {
   const auto some_of = [](const LibraryObject& object) {
-    std::vector<const Surfel*> some;
     const auto& surfels = object.model.surfels();
-    const std::size_t step = std::max<std::size_t>(1, surfels.size() / kCornerPoints);
-    for (std::size_t i = 0; i < surfels.size(); i += step) some.push_back(&surfels[i]);
-    return some;
+    return some_surfels(surfels, std::vector<std::uint8_t>(surfels.size(), 1), kCornerPoints);
   };
   const auto of_a = some_of(a), of_b = some_of(b);
   const auto lies_before = [&](const std::vector<const Surfel*>& points,

@@ -1,6 +1,7 @@
 // What the parts of ObjectTracker share while one frame is worked on.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <vector>
@@ -46,6 +47,10 @@ std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose
 
 /// Share of the surfels that lie in the box, grown by `margin_m` on all sides.
 double inside_share(const std::vector<Surfel>& surfels, const OrientedBox& box, double margin_m);
+
+/// About so many of the marked surfels (1: marked), spread evenly over all of them.
+std::vector<const Surfel*> some_surfels(const std::vector<Surfel>& surfels,
+                                        const std::vector<std::uint8_t>& marked, std::size_t about);
 
 /// Whether the point [m, W] lies before most of the surface, by more than `before_m`.
 bool is_before(const std::vector<const Surfel*>& surface, const Eigen::Vector3f& point_W,

@@ -76,6 +76,38 @@ TEST_F(Companions, SeenAsTwoTheyHaveToBeSeenAsOneForAsLongAgain) {
   EXPECT_EQ(boxes(), 1u) << rig_.told();
 }
 
+/// Two walls that meet in a corner, seen from within.
+class Corner : public ::testing::Test {
+ protected:
+  const SceneObject far_ = solid(kBoxClass, {0.15, 2.6}, {0.7, 0.05, 0.8});
+  const SceneObject side_ = solid(kBoxClass, {0.525, 2.0}, {0.05, 1.2, 0.8});
+  const Scene both_ = room_with({far_, side_});
+  TrackerRig rig_;
+};
+
+TEST_F(Corner, WallsAreNotJoinedHoweverLongTheyAreOnePiece) {
+  rig_.look_times(8, both_, [](test::Segmented& s) { test::cut(s, kBoxClass, 0.48f, 1, 2); });
+  ASSERT_EQ(rig_.of_class(kBoxClass).size(), 2u) << rig_.told();
+  rig_.look_times(3 * StateConfig().merge_frames, both_);
+  EXPECT_EQ(rig_.of_class(kBoxClass).size(), 2u) << rig_.told();
+}
+
+TEST_F(Corner, AWallThatWasNotSeenStandsWhenTheOtherOneIsGone) {
+  rig_.look_times(10, both_);
+  ASSERT_EQ(rig_.of_class(kBoxClass).size(), 1u) << rig_.told();
+  const ObjectId id = rig_.of_class(kBoxClass)[0]->id;
+  // Next time the other wall is out of view, to the right.
+  rig_.eye = test::look_from({-0.5, 1.0, 1.0});
+  rig_.look(room_with({side_}), {}, 60.0);
+  rig_.look_times(14, room_with({side_}));
+  ASSERT_EQ(rig_.count(EventKind::kRemoved), 1u) << rig_.told();
+  ASSERT_EQ(rig_.of_class(kBoxClass).size(), 1u) << rig_.told();
+  const LibraryObject& rest = *rig_.of_class(kBoxClass)[0];
+  EXPECT_EQ(rest.id, id);
+  EXPECT_NEAR(rest.box.pose.position_W.x(), 0.5, 0.06);
+  EXPECT_NEAR(longest_side(rest.box), 1.2, 0.25);
+}
+
 /// A box that is there, and two doubtful frames at the end of a visit.
 class InARow : public ::testing::Test {
  protected:
