@@ -39,6 +39,14 @@ bool is_before(const std::vector<const Surfel*>& surface, const Eigen::Vector3f&
   return 2 * static_cast<std::size_t>(of) > surface.size();
 }
 
+bool lie_before(const std::vector<const Surfel*>& points, const std::vector<const Surfel*>& surface,
+                double before_m) {
+  const auto before = std::count_if(points.begin(), points.end(), [&](const Surfel* s) {
+    return is_before(surface, s->point_W, before_m);
+  });
+  return 2 * static_cast<std::size_t>(before) > points.size();
+}
+
 bool ObjectTracker::may_be_one(const LibraryObject& a, const LibraryObject& b) const {
   // Two things that moved, each as a whole, are two; what arrived is no side of what stood there.
   if (a.moved && b.moved) return false;
@@ -52,14 +60,8 @@ bool ObjectTracker::form_corner(const LibraryObject& a, const LibraryObject& b) 
     return some_surfels(surfels, std::vector<std::uint8_t>(surfels.size(), 1), kCornerPoints);
   };
   const auto of_a = some_of(a), of_b = some_of(b);
-  const auto lies_before = [&](const std::vector<const Surfel*>& points,
-                               const std::vector<const Surfel*>& surface) {
-    const auto before = std::count_if(points.begin(), points.end(), [&](const Surfel* s) {
-      return is_before(surface, s->point_W, 2.0 * contact_m());
-    });
-    return 2 * static_cast<std::size_t>(before) > points.size();
-  };
-  return lies_before(of_a, of_b) && lies_before(of_b, of_a);
+  const double before_m = 2.0 * contact_m();
+  return lie_before(of_a, of_b, before_m) && lie_before(of_b, of_a, before_m);
 }
 
 bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) const {

@@ -65,12 +65,17 @@ std::size_t spare_other_wall(const std::vector<Surfel>& surfels,
                              std::vector<std::uint8_t>& standing) {
   const std::vector<const Surfel*> some = some_surfels(surfels, gone, kOtherWallPoints);
   std::vector<std::size_t> before;
+  std::vector<const Surfel*> wall;
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     if (gone[i] || standing[i]) continue;
-    if (is_before(some, surfels[i].point_W, before_m)) before.push_back(i);
+    if (!is_before(some, surfels[i].point_W, before_m)) continue;
+    before.push_back(i);
+    wall.push_back(&surfels[i]);
   }
   if (static_cast<double>(before.size()) < kOtherWallShare * static_cast<double>(surfels.size()))
     return 0;
+  // The near wall of a container lies before the far one, but not the other way round.
+  if (!lie_before(some, wall, before_m)) return 0;
   for (const std::size_t i : before) standing[i] = 1;
   return before.size();
 }

@@ -55,5 +55,8 @@ std::vector<const Surfel*> some_surfels(const std::vector<Surfel>& surfels,
 /// Whether the point [m, W] lies before most of the surface, by more than `before_m`.
 bool is_before(const std::vector<const Surfel*>& surface, const Eigen::Vector3f& point_W,
                double before_m);
+/// Whether most of the points do.
+bool lie_before(const std::vector<const Surfel*>& points, const std::vector<const Surfel*>& surface,
+                double before_m);
 
 }  // namespace pocd

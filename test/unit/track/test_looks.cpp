@@ -108,6 +108,22 @@ TEST_F(Corner, AWallThatWasNotSeenStandsWhenTheOtherOneIsGone) {
   EXPECT_NEAR(longest_side(rest.box), 1.2, 0.25);
 }
 
+// The near wall lies before the far one, but the far one does not lie before the near one.
+TEST_F(Corner, TheNearWallOfAContainerThatIsGoneDoesNotStand) {
+  const Scene container = room_with({solid(kBoxClass, {0.0, 1.8}, {1.0, 0.05, 0.6}),
+                                     solid(kBoxClass, {0.0, 2.4}, {1.0, 0.05, 0.9}),
+                                     solid(kBoxClass, {-0.475, 2.1}, {0.05, 0.6, 0.6}),
+                                     solid(kBoxClass, {0.475, 2.1}, {0.05, 0.6, 0.6})});
+  rig_.look_times(10, container);
+  ASSERT_EQ(rig_.of_class(kBoxClass).size(), 1u) << rig_.told();
+  // Next time the near wall is out of view, below.
+  rig_.eye = test::look_from({0.0, 1.3, 1.0});
+  rig_.look(room_with({}), {}, 60.0);
+  rig_.look_times(14, room_with({}));
+  EXPECT_EQ(rig_.count(EventKind::kRemoved), 1u) << rig_.told();
+  EXPECT_EQ(rig_.of_class(kBoxClass).size(), 0u) << rig_.told();
+}
+
 /// A box that is there, and two doubtful frames at the end of a visit.
 class InARow : public ::testing::Test {
  protected:
