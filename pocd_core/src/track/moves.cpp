@@ -22,12 +22,10 @@ constexpr double kWholeShare = 0.6;
 constexpr double kEmptyShare = 0.25;
 /// At least this share of the old surface, moved, is seen at the new place.
 constexpr double kSeenShare = 0.2;
-/// A thing in a place that was not seen empty before moved no farther than this, in its lengths,
-/// unless it is whole and fits surely. When less than kWholeShare of it is seen, it fits surely and
-/// has turned by less than kShiftRad: else it may be what the old one hid. It fits surely when at
-/// least kSureFit of the new surface has a place on the old body, and nothing speaks against the
-/// rest.
-constexpr double kNearShare = 1.0;
+/// When less than kWholeShare of a thing is seen, in a place that was not seen empty before, it
+/// fits surely and has turned by less than kShiftRad: else it may be what the old one hid. It fits
+/// surely when at least kSureFit of the new surface has a place on the old body, and nothing speaks
+/// against the rest.
 constexpr double kSureFit = 0.9;
 constexpr double kShiftRad = M_PI / 4.0;
 /// So far, in its lengths or in shares of the reach, a move is told at once.
@@ -112,10 +110,6 @@ std::optional<Motion> ObjectTracker::explanation(const Step& step, const Departu
       motion.seen < kWholeShare) {
     return std::nullopt;
   }
-  const bool surely_whole =
-      found.arrival == Arrival::kUnknown && motion.seen >= kWholeShare && motion.fits_surely;
-  if (motion.lengths > kNearShare && found.arrival != Arrival::kArrived && !surely_whole)
-    return std::nullopt;
   return motion;
 }
 
