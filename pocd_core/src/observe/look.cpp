@@ -36,20 +36,27 @@ int min_hits(const LibraryObject& object) {
   return object.observations > kYoungObservations ? 2 : 1;
 }
 
-/// Points at pixels that masks give to another thing: measured, but not of this object.
-int measured_otherwise(const Sighting& s, const Observations& observations, std::int32_t own) {
-  if (own == Observations::kNone || observations.list[own].instance == 0) return 0;
-  int other = 0;
+/// Points at pixels that masks give to another thing: measured, but not of this object. Of another
+/// class, only when most of its points are: masks err at the borders of things.
+int measured_otherwise(const Sighting& s, const Observations& observations, ClassId class_id,
+                       std::int32_t own) {
+  const bool by_instance = own != Observations::kNone && observations.list[own].instance != 0;
+  int of_instance = 0, of_class = 0;
   for (const auto& t : s.touches) {
-    if (t.observation != own && observations.list[t.observation].instance != 0) other += t.hit;
+    const Observation& other = observations.list[t.observation];
+    if (by_instance && t.observation != own && other.instance != 0) {
+      of_instance += t.hit;
+    } else if (class_id != kThing && other.class_id != kThing && other.class_id != class_id) {
+      of_class += t.hit;
+    }
   }
-  return other;
+  return of_instance + (of_class > kMajority * s.hit ? of_class : 0);
 }
 
 struct Tally {
   int here = 0;     ///< measured in place
   int through = 0;  ///< seen through
-  int covered = 0;  ///< covered by, or measured as, a thing of the same class
+  int covered = 0;  ///< measured as another thing, or covered by one of the same class
   double contested_share() const {
     const int all = here + through + covered;
     return all > 0 ? static_cast<double>(through + covered) / all : 0.0;
@@ -59,7 +66,7 @@ struct Tally {
 Tally tally_of(const Sighting& s, const Observations& observations, ClassId class_id,
                std::int32_t own) {
   Tally tally;
-  const int other = measured_otherwise(s, observations, own);
+  const int other = measured_otherwise(s, observations, class_id, own);
   tally.here = s.hit - other;
   tally.through = s.seen_through;
   tally.covered = other;
@@ -123,8 +130,8 @@ const char* to_string(Verdict verdict) {
 void judge(const OrganizedCloud& cloud, const DepthField& field, const Observations& observations,
            const SightConfig& sight, const DepthNoise& noise, Look& look) {
   const LibraryObject& object = *look.object;
-  sight_object(object.model.surfels(), object.class_id, min_hits(object), cloud, field,
-               observations, sight, noise, look.sighting);
+  sight_object(object.model.surfels(), min_hits(object), cloud, field, observations, sight, noise,
+               look.sighting);
   const Sighting& s = look.sighting;
   look.verdict = Verdict::kTooLittleSeen;
   look.contested = false;
@@ -213,8 +220,7 @@ void align(const OrganizedCloud& cloud, const DepthField& field, const Observati
       s.normal_W = T.linear() * s.normal_W;
     }
     static thread_local Sighting there;
-    sight_object(moved, object.class_id, min_hits(object), cloud, field, observations, sight, noise,
-                 there);
+    sight_object(moved, min_hits(object), cloud, field, observations, sight, noise, there);
     const Tally after = tally_of(there, observations, object.class_id, look.observation);
     const int in_view = after.here + after.through + there.occluded + there.unknown;
     if (after.here < kMajority * in_view || after.here < config.min_visible_share * there.total)

@@ -72,11 +72,10 @@ void touch(std::vector<Sighting::Touch>& touches, std::int32_t observation, bool
 
 }  // namespace
 
-void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_hits,
-                  const OrganizedCloud& cloud, const DepthField& field,
-                  const Observations& observations, const SightConfig& config,
-                  const DepthNoise& noise, Sighting& out) {
-  out.total = out.hit = out.seen_through = out.occluded = out.unknown = out.hit_other_class = 0;
+void sight_object(const std::vector<Surfel>& surfels, int min_hits, const OrganizedCloud& cloud,
+                  const DepthField& field, const Observations& observations,
+                  const SightConfig& config, const DepthNoise& noise, Sighting& out) {
+  out.total = out.hit = out.seen_through = out.occluded = out.unknown = 0;
   out.differences_m.clear();
   out.touches.clear();
   out.sights.assign(surfels.size(), Sight::kOutOfView);
@@ -131,7 +130,6 @@ void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_
         ++out.hit;
         out.differences_m.push_back(difference);
         touch(out.touches, observations.observation_of[pixel], true);
-        if (cloud.label[pixel] != class_id) ++out.hit_other_class;
         break;
       case Sight::kSeenThrough:
         ++out.seen_through;

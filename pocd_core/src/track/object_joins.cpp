@@ -217,4 +217,14 @@ LibraryObject* ObjectTracker::whole_of(Step& step, const LibraryObject& found) {
   return nullptr;
 }
 
+LibraryObject* ObjectTracker::grown_onto(Step& step, const LibraryObject& object) {
+  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
+  if (!object.added_ns || step.frame.stamp_ns - *object.added_ns > window_ns) return nullptr;
+  LibraryObject* whole = whole_of(step, object);
+  if (!whole || may_be_one(object, *whole)) return whole;
+  // Of one visit, whether they arrived is told of what was seen of each.
+  const auto gap_ns = static_cast<StampNs>(config_.state.visit_gap_s * 1e9);
+  return std::abs(object.first_seen_ns - whole->first_seen_ns) <= gap_ns ? whole : nullptr;
+}
+
 }  // namespace pocd

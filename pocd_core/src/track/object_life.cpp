@@ -36,7 +36,6 @@ void ObjectTracker::report_changes(Step& step) {
   find_far_moves(step);
   std::sort(changed_.begin(), changed_.end());
   changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
-  const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   const double notable_m = std::max(config_.change.tau_m, 2.0 * config_.map.voxel_size_m);
   std::vector<ObjectId> touched;
   for (const ObjectId id : changed_) {
@@ -57,12 +56,10 @@ void ObjectTracker::report_changes(Step& step) {
     // Seen better, what was reported as new may turn out to be what departed before.
     if (object->added_ns && find_origin(step, *object)) continue;
     // Or a side of what stands there.
-    if (object->added_ns && step.frame.stamp_ns - *object->added_ns <= window_ns) {
-      if (LibraryObject* whole = whole_of(step, *object)) {
-        const bool older = whole->id < id;
-        absorb(step, older ? *whole : *object, older ? *object : *whole);
-        continue;
-      }
+    if (LibraryObject* whole = grown_onto(step, *object)) {
+      const bool older = whole->id < id;
+      absorb(step, older ? *whole : *object, older ? *object : *whole);
+      continue;
     }
     add_event(step, EventKind::kUpdated, *object,
               object->lost > 0 ? Rule::kPartRemoved : Rule::kGrew);

@@ -107,6 +107,9 @@ class ObjectTracker {
   bool seen_apart(const Step& step, ObjectId a, ObjectId b) const;
   /// The known object that a new one is another side of; or null.
   LibraryObject* whole_of(Step& step, const LibraryObject& found);
+  /// The one that an object that was reported lately, and has grown since, is another side of; or
+  /// null. What stood there longer is no side of what arrived.
+  LibraryObject* grown_onto(Step& step, const LibraryObject& object);
   /// Takes the marked surfels out of the object and the map, and reports them as gone when they are
   /// more than an edge.
   void lose_part(Step& step, LibraryObject& object, const std::vector<std::uint8_t>& marked,

@@ -66,8 +66,8 @@ Pair object_and_observation(const SceneObject& before, const SceneObject& after)
   pair.now = test::segment(shoot(room_with({after}), T_W_C), config);
   DepthField field;
   field.update(pair.now.cloud);
-  sight_object(pair.object.model.surfels(), kBoxClass, 1, pair.now.cloud, field,
-               pair.now.observations, {0.1, 0.03, 4.0}, config.depth_noise, pair.sighting);
+  sight_object(pair.object.model.surfels(), 1, pair.now.cloud, field, pair.now.observations,
+               {0.1, 0.03, 4.0}, config.depth_noise, pair.sighting);
   return pair;
 }
 

@@ -119,6 +119,15 @@ TEST(Judge, ResemblanceElsewhereSaysNothing) {
   EXPECT_EQ(look.verdict, Verdict::kUnobserved);
 }
 
+TEST(Judge, AThingOfAnotherClassInItsPlaceIsNotTheThing) {
+  KnownThings known;
+  known.learn(the_box());
+  const Look& look = known.look_at_only(room_with({solid(kCageClass, {0.0, 2.3}, kSize)}));
+  EXPECT_EQ(look.verdict, Verdict::kHidden);
+  EXPECT_TRUE(look.contested);
+  EXPECT_EQ(look.sighting.hit, look.sighting.total) << "it coincides";
+}
+
 // Another thing stands where it was and coincides with a part of its surface.
 TEST(Judge, WhatCoincidesWithAnotherThingDoesNotStand) {
   KnownThings known;

@@ -42,7 +42,7 @@ Sighting sight(const ObjectModel& model, const Frame& frame, int min_hits = 2,
   DepthField field;
   field.update(s.cloud);
   Sighting out;
-  sight_object(model.surfels(), kBoxClass, min_hits, s.cloud, field, s.observations, config,
+  sight_object(model.surfels(), min_hits, s.cloud, field, s.observations, config,
                pipeline.depth_noise, out);
   return out;
 }
@@ -54,7 +54,6 @@ TEST(Visibility, InPlaceIsHitWithoutDifference) {
   EXPECT_EQ(s.hit, s.total);
   EXPECT_EQ(s.seen_through_share(), 0.0);
   EXPECT_EQ(s.visible_share(), 1.0);
-  EXPECT_EQ(s.hit_other_class, 0);
   ASSERT_EQ(s.differences_m.size(), static_cast<std::size_t>(s.total));
   // A fronto-parallel face, half a degree of pixels aslant: below 5 mm.
   for (const float d : s.differences_m) EXPECT_NEAR(d, 0.0f, 0.005f);
@@ -183,13 +182,6 @@ TEST(Visibility, OnlyEstablishedSurfelsBearWitness) {
   EXPECT_EQ(sight(once, frame, 2).sights.size(), once.surfels().size());
 }
 
-TEST(Visibility, AnotherClassInItsPlaceIsSaid) {
-  const Frame frame = shoot(room_with({solid(kCageClass, {0, 2.4}, kBoxSize)}), viewpoint());
-  const Sighting s = sight(front_of_the_box(), frame);
-  EXPECT_EQ(s.hit, s.total);
-  EXPECT_EQ(s.hit_other_class, s.hit);
-}
-
 TEST(Visibility, NeedsNoReturnWithinTheDepthLimit) {
   // The wall is beyond the limit, but its returns prove that the place before it is empty.
   PipelineConfig pipeline = test::room_config();
@@ -198,8 +190,8 @@ TEST(Visibility, NeedsNoReturnWithinTheDepthLimit) {
   DepthField field;
   field.update(s.cloud);
   Sighting out;
-  sight_object(front_of_the_box().surfels(), kBoxClass, 2, s.cloud, field, s.observations,
-               {0.1, 0.03, 3.0}, pipeline.depth_noise, out);
+  sight_object(front_of_the_box().surfels(), 2, s.cloud, field, s.observations, {0.1, 0.03, 3.0},
+               pipeline.depth_noise, out);
   EXPECT_GT(out.seen_through, 0.8 * out.total);
 }
 

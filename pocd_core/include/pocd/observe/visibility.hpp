@@ -57,8 +57,6 @@ struct Sighting {
   std::vector<Touch> touches;
   /// Per surfel of the model, for erosion.
   std::vector<Sight> sights;
-  /// Surfels hit at pixels of another class than the object's.
-  int hit_other_class = 0;
 
   int visible() const { return hit + seen_through; }
   double visible_share() const { return total > 0 ? static_cast<double>(visible()) / total : 0.0; }
@@ -73,9 +71,8 @@ struct Sighting {
 
 /// Projects the model into the frame. Surfels facing away are out of view. Margin: config.margin_m
 /// or three sigma of the depth noise, whichever is larger.
-void sight_object(const std::vector<Surfel>& surfels, ClassId class_id, int min_hits,
-                  const OrganizedCloud& cloud, const DepthField& field,
-                  const Observations& observations, const SightConfig& config,
-                  const DepthNoise& noise, Sighting& out);
+void sight_object(const std::vector<Surfel>& surfels, int min_hits, const OrganizedCloud& cloud,
+                  const DepthField& field, const Observations& observations,
+                  const SightConfig& config, const DepthNoise& noise, Sighting& out);
 
 }  // namespace pocd
