@@ -124,6 +124,41 @@ TEST_F(Corner, TheNearWallOfAContainerThatIsGoneDoesNotStand) {
   EXPECT_EQ(rig_.of_class(kBoxClass).size(), 0u) << rig_.told();
 }
 
+// A screen hides the right half of a bench. Its end is seen first, from the right.
+TEST(Found, WhatGrewOntoAKnownThingIsASideOfIt) {
+  const SceneObject bench = solid(kBoxClass, {0.0, 2.4}, {1.8, 0.3, 1.3});
+  const SceneObject screen = solid(kCageClass, {0.4, 1.6}, {0.9, 0.1, 1.6});
+  TrackerRig rig;
+  rig.look_times(10, room_with({bench, screen}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  const ObjectId known = rig.of_class(kBoxClass)[0]->id;
+  rig.eye = test::look_from({1.5, 1.2, 1.0});
+  rig.look(room_with({bench}), {}, 60.0);
+  rig.look_times(8, room_with({bench}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
+  // Sooner than what is one piece for long is joined.
+  rig.eye = test::look_from({0.5, 0.6, 1.0});
+  rig.look_times(StateConfig().merge_frames / 2, room_with({bench}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
+}
+
+// Of four times its length, behind what hid the place: nobody saw that it was empty before.
+TEST(Found, AThingThatMovedFarToAHiddenPlaceHasMoved) {
+  const Eigen::Vector3d size(0.3, 0.3, 0.5);
+  const SceneObject screen = solid(kCageClass, {0.6, 1.8}, {0.6, 0.05, 1.4});
+  TrackerRig rig;
+  rig.look_times(10, room_with({solid(kBoxClass, {-0.6, 2.2}, size), screen}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  const ObjectId known = rig.of_class(kBoxClass)[0]->id;
+  const Scene after = room_with({solid(kBoxClass, {0.6, 2.2}, size)});
+  rig.look(after, {}, 60.0);
+  rig.look_times(40, after);
+  EXPECT_EQ(rig.count(EventKind::kMoved), 1u) << rig.told();
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
+}
+
 /// A box that is there, and two doubtful frames at the end of a visit.
 class InARow : public ::testing::Test {
  protected:
