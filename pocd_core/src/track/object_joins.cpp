@@ -218,6 +218,8 @@ LibraryObject* ObjectTracker::whole_of(Step& step, const LibraryObject& found) {
 }
 
 LibraryObject* ObjectTracker::grown_onto(Step& step, const LibraryObject& object) {
+  // Without a class, what touches may be two things: they have to be seen as one for long.
+  if (object.class_id == kThing) return nullptr;
   const auto window_ns = static_cast<StampNs>(config_.state.relocation_window_s * 1e9);
   if (!object.added_ns || step.frame.stamp_ns - *object.added_ns > window_ns) return nullptr;
   LibraryObject* whole = whole_of(step, object);

@@ -27,15 +27,15 @@ constexpr double kViewCells = 100.0;
 /// So far in front of a surface a voxel was seen empty.
 constexpr double kClearVoxels = 1.5;
 
-bool shapes_box(const LibraryObject& object, const Surfel& surfel) {
-  return surfel.hits >= (object.observations > 4 ? kEstablishedHits : 1) &&
-         surfel.seen_through < kGoneHits;
+int least_hits(const LibraryObject& object) {
+  return object.observations > 4 ? kEstablishedHits : 1;
 }
 
-std::size_t shaping_surfels(const LibraryObject& object) {
+std::size_t established_surfels(const LibraryObject& object) {
   const auto& surfels = object.model.surfels();
-  return static_cast<std::size_t>(std::count_if(
-      surfels.begin(), surfels.end(), [&](const Surfel& s) { return shapes_box(object, s); }));
+  const int least = least_hits(object);
+  return static_cast<std::size_t>(std::count_if(surfels.begin(), surfels.end(),
+                                                [&](const Surfel& s) { return s.hits >= least; }));
 }
 
 }  // namespace
@@ -255,9 +255,9 @@ void ObjectTracker::fuse_parts(Step& step) {
     const std::size_t surfels = object->model.surfels().size();
     object->most_surfels = std::max(object->most_surfels, surfels);
     // The box follows the model; refitting for every few points would cost more than it tells.
-    const auto shaping = static_cast<double>(shaping_surfels(*object));
-    const double difference = std::abs(shaping - static_cast<double>(object->box_surfels));
-    if (object->observations < 10 || difference > 0.02 * shaping) refit_box(step, *object);
+    const auto established = static_cast<double>(established_surfels(*object));
+    const double difference = std::abs(established - static_cast<double>(object->box_surfels));
+    if (object->observations < 10 || difference > 0.02 * established) refit_box(step, *object);
   }
   for (std::size_t n = 0; n < step.look_count; ++n) {
     LibraryObject& object = *looks_[n].object;
@@ -311,7 +311,7 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
   points.reserve(object.model.surfels().size());
   normals.reserve(object.model.surfels().size());
   for (const Surfel& s : object.model.surfels()) {
-    if (!shapes_box(object, s)) continue;
+    if (s.hits < least_hits(object) || s.seen_through >= kGoneHits) continue;
     points.push_back(s.point_W);
     normals.push_back(s.normal_W);
   }
@@ -338,7 +338,7 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
       box.pose.position_W.z() = 0.5 * (top + ground_m);
     }
   }
-  object.box_surfels = shaping_surfels(object);
+  object.box_surfels = established_surfels(object);
   library_.place(object, box);
 }
 
