@@ -11,16 +11,20 @@ namespace {
 constexpr std::size_t kStarts = 16;
 constexpr std::size_t kStartPoints = 60;
 
+/// A length of a thing of which only a part may be known.
+double with_room(double length_m, double slack_m) {
+  return length_m + std::max(slack_m, 0.25 * length_m);
+}
+
 }  // namespace
 
-bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m) {
-  const auto sorted = [](const OrientedBox& box) {
-    const double x = box.size_m.x(), y = box.size_m.y();
-    return Eigen::Vector3d(std::max(x, y), std::min(x, y), box.size_m.z());
-  };
-  const Eigen::Vector3d f = sorted(found), k = sorted(known);
-  const auto room = [&](double x) { return x + std::max(slack_m, 0.25 * x); };
-  return f[0] <= room(k[0]) && f[1] <= room(k[0]) && f[2] <= room(k[2]) && k[2] <= room(f[2]);
+bool stands_as_high(const OrientedBox& found, const OrientedBox& known, double slack_m) {
+  return known.size_m.z() <= with_room(found.size_m.z(), slack_m);
+}
+
+bool is_larger(const OrientedBox& found, const OrientedBox& known, double slack_m) {
+  return longest_side(found) > with_room(longest_side(known), slack_m) ||
+         found.size_m.z() > with_room(known.size_m.z(), slack_m);
 }
 
 std::vector<Pose> likely_starts(const OrientedBox& known, const OrientedBox& found,

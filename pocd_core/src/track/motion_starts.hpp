@@ -8,9 +8,12 @@
 
 namespace pocd {
 
-/// Whether the found box [m] is no larger than the known one, and stands as high, up to a quarter
-/// of each side and `slack_m`.
-bool may_be(const OrientedBox& found, const OrientedBox& known, double slack_m);
+/// Whether the found box stands as high as the known one, up to a quarter and `slack_m` [m].
+bool stands_as_high(const OrientedBox& found, const OrientedBox& known, double slack_m);
+
+/// Whether the found box is longer or higher than the known one by more than a quarter and
+/// `slack_m` [m].
+bool is_larger(const OrientedBox& found, const OrientedBox& known, double slack_m);
 
 /// Motions from `found` to `known` that put their boxes' sides on each other, the likeliest ones
 /// first: with the heading that it has and with the sides along each other; by the middles and by

@@ -125,7 +125,10 @@ std::optional<Motion> ObjectTracker::motion_of(const Step& step, const Departure
   const double parts_m =
       0.5 * (departure.box.size_m.head<2>().norm() + found.box.size_m.head<2>().norm());
   if (distance_m > config_.state.relocation_reach_m + parts_m) return std::nullopt;
-  if (!may_be(found.box, departure.box, slack_m)) return std::nullopt;
+  if (!stands_as_high(found.box, departure.box, slack_m)) return std::nullopt;
+  // Of a thing with a class only a part may have been known; without one, what is larger is
+  // another.
+  if (found.class_id == kThing && is_larger(found.box, departure.box, slack_m)) return std::nullopt;
 
   Points source;
   const auto& surfels = found.model.surfels();

@@ -14,8 +14,6 @@ namespace {
 
 /// Points of established objects must have been measured in this many frames to shape the box.
 constexpr int kEstablishedHits = 2;
-/// What was seen through in so many looks in a row does not.
-constexpr int kGoneHits = 3;
 /// An object that is found displaced in so many looks in a row has moved.
 constexpr int kDisplacedLooks = 3;
 /// Shorter motions than this share of the distance that verifies an object are noise.
@@ -26,17 +24,6 @@ constexpr double kNoiseShare = 0.6;
 constexpr double kViewCells = 100.0;
 /// So far in front of a surface a voxel was seen empty.
 constexpr double kClearVoxels = 1.5;
-
-int least_hits(const LibraryObject& object) {
-  return object.observations > 4 ? kEstablishedHits : 1;
-}
-
-std::size_t established_surfels(const LibraryObject& object) {
-  const auto& surfels = object.model.surfels();
-  const int least = least_hits(object);
-  return static_cast<std::size_t>(std::count_if(surfels.begin(), surfels.end(),
-                                                [&](const Surfel& s) { return s.hits >= least; }));
-}
 
 }  // namespace
 
@@ -255,9 +242,10 @@ void ObjectTracker::fuse_parts(Step& step) {
     const std::size_t surfels = object->model.surfels().size();
     object->most_surfels = std::max(object->most_surfels, surfels);
     // The box follows the model; refitting for every few points would cost more than it tells.
-    const auto established = static_cast<double>(established_surfels(*object));
-    const double difference = std::abs(established - static_cast<double>(object->box_surfels));
-    if (object->observations < 10 || difference > 0.02 * established) refit_box(step, *object);
+    const auto difference =
+        std::abs(static_cast<double>(surfels) - static_cast<double>(object->box_surfels));
+    if (object->observations < 10 || difference > 0.02 * static_cast<double>(surfels))
+      refit_box(step, *object);
   }
   for (std::size_t n = 0; n < step.look_count; ++n) {
     LibraryObject& object = *looks_[n].object;
@@ -310,8 +298,9 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
   Points points, normals;
   points.reserve(object.model.surfels().size());
   normals.reserve(object.model.surfels().size());
+  const int min_hits = object.observations > 4 ? kEstablishedHits : 1;
   for (const Surfel& s : object.model.surfels()) {
-    if (s.hits < least_hits(object) || s.seen_through >= kGoneHits) continue;
+    if (s.hits < min_hits || s.seen_through >= 3) continue;
     points.push_back(s.point_W);
     normals.push_back(s.normal_W);
   }
@@ -338,7 +327,7 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
       box.pose.position_W.z() = 0.5 * (top + ground_m);
     }
   }
-  object.box_surfels = established_surfels(object);
+  object.box_surfels = object.model.surfels().size();
   library_.place(object, box);
 }
 

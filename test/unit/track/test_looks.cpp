@@ -128,7 +128,9 @@ TEST_F(Corner, TheNearWallOfAContainerThatIsGoneDoesNotStand) {
 TEST(Found, WhatGrewOntoAKnownThingIsASideOfIt) {
   const SceneObject bench = solid(kBoxClass, {0.0, 2.4}, {1.8, 0.3, 1.3});
   const SceneObject screen = solid(kCageClass, {0.4, 1.6}, {0.9, 0.1, 1.6});
-  TrackerRig rig;
+  PipelineConfig config = test::room_config();
+  config.state.merge_frames = 1000;  // it is not joined for being one piece for long
+  TrackerRig rig(config);
   rig.look_times(10, room_with({bench, screen}));
   ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
   const ObjectId known = rig.of_class(kBoxClass)[0]->id;
@@ -136,11 +138,30 @@ TEST(Found, WhatGrewOntoAKnownThingIsASideOfIt) {
   rig.look(room_with({bench}), {}, 60.0);
   rig.look_times(8, room_with({bench}));
   ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
-  // Sooner than what is one piece for long is joined.
+  // Then the middle, from above to below.
   rig.eye = test::look_from({0.5, 0.6, 1.0});
-  rig.look_times(StateConfig().merge_frames / 2, room_with({bench}));
+  rig.look(room_with({bench, solid(kCageClass, {0.4, 1.6}, {0.9, 0.1, 0.7})}));
+  rig.look_times(3, room_with({bench}));
   ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
   EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
+}
+
+// Of what left, a screen hid nearly the half: what came is larger than what was known.
+TEST(Found, AThingOfWhichOnlyAPartWasKnownMovesAsAWhole) {
+  const Eigen::Vector3d size(0.9, 0.3, 0.7);
+  const SceneObject screen = solid(kCageClass, {-0.12, 1.6}, {0.33, 0.1, 1.6});
+  TrackerRig rig;
+  rig.look_times(10, room_with({solid(kBoxClass, {-0.5, 2.3}, size), screen}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  const LibraryObject& known = *rig.of_class(kBoxClass)[0];
+  ASSERT_LT(longest_side(known.box), 0.65);
+  const ObjectId id = known.id;
+  const Scene after = room_with({solid(kBoxClass, {0.6, 2.3}, size), screen});
+  rig.look(after, {}, 60.0);
+  rig.look_times(40, after);
+  EXPECT_EQ(rig.count(EventKind::kMoved), 1u) << rig.told();
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, id);
 }
 
 // Of four times its length, behind what hid the place: nobody saw that it was empty before.

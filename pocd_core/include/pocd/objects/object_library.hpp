@@ -70,7 +70,7 @@ struct LibraryObject {
   std::map<ObjectId, int> companions;
   static constexpr int kToldApart = -1;  ///< masks showed them as two things
 
-  std::size_t box_surfels = 0;  ///< that were established when the box was fitted
+  std::size_t box_surfels = 0;  ///< size of the model when the box was fitted
   std::size_t most_surfels = 0;
   double most_free = 0.0;  ///< largest Observation::free_beside_share of a look
   /// Alignment target made of the model; dropped when the model changes.
