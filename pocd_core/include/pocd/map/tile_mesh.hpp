@@ -29,8 +29,9 @@ struct TileMesh {
 /// The triangles of extract_mesh() whose cell has its lowest corner in this tile: together the
 /// meshes of all tiles are the surface of the map, each triangle once. Cells reach into the seven
 /// upper neighbours; normals are central differences of the distances and look at all 26. Empty
-/// when the tile is not there. Thread-safe as far as `tile_of` is.
-TileMesh extract_tile_mesh(const TileKey& key, const TileLookup& tile_of);
+/// when the tile is not there. Like there, triangles across a tear of more than four voxels
+/// (`voxel_size_m`) are left out. Thread-safe as far as `tile_of` is.
+TileMesh extract_tile_mesh(const TileKey& key, double voxel_size_m, const TileLookup& tile_of);
 
 /// The tiles whose mesh may change when this one does, itself among them: it is their neighbour.
 std::vector<TileKey> tiles_drawn_with(const TileKey& key);
