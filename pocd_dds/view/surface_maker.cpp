@@ -5,7 +5,8 @@
 namespace pocd::view {
 namespace {
 
-constexpr int kCoarseVoxels = 4;
+// One cube inside of a tile, and what lies on its sides: every 0.4 m with voxels of 0.05 m.
+constexpr int kCoarseVoxels = 16;
 // 36 KB each. A tile needs its neighbours, of which most are needed again soon.
 constexpr std::size_t kMostDecoded = 512;
 

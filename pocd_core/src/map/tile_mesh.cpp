@@ -161,7 +161,9 @@ TileMesh coarsened(const TileMesh& mesh, int cell_voxels) {
   for (const TileVertex& vertex : mesh.vertices) {
     std::array<int, 3> cell;
     for (int i = 0; i < 3; ++i) {
-      cell[i] = static_cast<int>(vertex.position_voxels[i]) / cell_voxels;
+      // What lies on the border to a neighbour stays there: the neighbour has the same vertices.
+      const float at = vertex.position_voxels[i];
+      cell[i] = at <= 0.0f ? -1 : at >= kTileSide ? kTileSide : static_cast<int>(at) / cell_voxels;
     }
     Cluster& cluster = clusters[cell];
     ++cluster.count;

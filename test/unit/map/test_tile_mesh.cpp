@@ -224,5 +224,31 @@ TEST(TileMesh, CoarserHasFewerTrianglesAtTheSamePlace) {
   EXPECT_LT(4 * coarse, fine);
 }
 
+// A floor over four tiles: the coarser surface has no gap between them.
+TEST(TileMesh, CoarserSurfacesOfNeighboursMeet) {
+  const TsdfConfig config = coarse_config();
+  const auto tiles = tiles_of(config, [](const Eigen::Vector3d& p) { return p.z() - 0.123; });
+  const Decoded decoded(tiles, config.truncation_m());
+  double fine_area = 0.0, coarse_area = 0.0;
+  const auto area_voxels2 = [](const TileMesh& mesh) {
+    double area = 0.0;
+    for (const auto& t : mesh.triangles) {
+      const Eigen::Vector3f a = mesh.vertices[t[0]].position_voxels;
+      const Eigen::Vector3f ab = mesh.vertices[t[1]].position_voxels - a;
+      const Eigen::Vector3f ac = mesh.vertices[t[2]].position_voxels - a;
+      area += 0.5 * ab.cross(ac).norm();
+    }
+    return area;
+  };
+  for (const TileKey& key :
+       {TileKey{-1, -1, 0}, TileKey{0, -1, 0}, TileKey{-1, 0, 0}, TileKey{0, 0, 0}}) {
+    const TileMesh mesh = extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded));
+    fine_area += area_voxels2(mesh);
+    coarse_area += area_voxels2(coarsened(mesh, 16));
+  }
+  EXPECT_NEAR(fine_area, 4 * 16 * 16, 0.1);
+  EXPECT_NEAR(coarse_area, fine_area, 0.1);
+}
+
 }  // namespace
 }  // namespace pocd::testing

@@ -37,8 +37,9 @@ TileMesh extract_tile_mesh(const TileKey& key, double voxel_size_m, const TileLo
 std::vector<TileKey> tiles_drawn_with(const TileKey& key);
 
 /// Coarser by vertex clustering (Rossignac and Borrel 1993): vertices in one cube of `cell_voxels`
-/// become their mean, and triangles with two corners in one cube go. The owner is that of most of
-/// the vertices of a cube, of the lowest id where they are as many.
+/// become their mean, and triangles with two corners in one cube go. Vertices on the sides of the
+/// tile keep to them, so that the coarser surfaces of neighbours meet without a gap. The owner is
+/// that of most of the vertices of a cube, of the lowest id where they are as many.
 TileMesh coarsened(const TileMesh& mesh, int cell_voxels);
 
 }  // namespace pocd
