@@ -69,12 +69,14 @@ export class Stage {
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
     if (document.hidden) return;
-    if (this.flight) this.fly(now);
+    // One frame is under way at most: a slow machine stays usable.
+    const ready = this.isDrawn();
+    if (ready && this.flight) this.fly(now);
     let more = false;
     for (const step of this.before) more = step(now) || more;
-    // One frame is under way at most, and new data alone takes half of the time: a slow machine stays usable.
     if (more) this.ask();
-    if (!this.isDrawn()) return;
+    if (!ready) return;
+    // New data alone takes half of the time.
     const due = this.askedSoon && performance.now() - this.drawnAt > Math.max(kDataFrame, 2 * this.cost);
     if (!this.asked && !due) return;
     this.asked = false;
