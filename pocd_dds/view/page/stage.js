@@ -151,11 +151,18 @@ export class Stage {
     // As far as it takes for all corners, and 4 % more.
     const right = new THREE.Vector3(0, 0, 1).cross(away).normalize(), up = away.clone().cross(right);
     const half = Math.tan(THREE.Math.degToRad(this.camera.fov / 2)), aspect = this.partWidth / this.height;
+    const ahead = this.top ? new THREE.Vector3(0, 1, 0) : up.clone().setZ(0).normalize();
     let distance = 2;
-    for (let i = 0; i < 8; ++i) {
-      const corner = new THREE.Vector3(i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y, i & 4 ? box.max.z : box.min.z).sub(target);
-      const reach = Math.max(Math.abs(corner.dot(right)) / aspect, Math.abs(corner.dot(up))) / half;
-      distance = Math.max(distance, 1.04 * reach + corner.dot(away));
+    for (let turn = 0; turn < 3; ++turn) {
+      const corners = Array.from({ length: 8 }, (_, i) => new THREE.Vector3(i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y, i & 4 ? box.max.z : box.min.z).sub(target));
+      distance = Math.max(2, ...corners.map((c) => 1.04 * Math.max(Math.abs(c.dot(right)) / aspect, Math.abs(c.dot(up))) / half + c.dot(away)));
+      if (turn === 2) break;
+      // What is near looks larger: the middle of the picture is not the middle of the box.
+      const middle = (axis) => {
+        const seen = corners.map((c) => c.dot(axis) / (distance - c.dot(away)));
+        return distance * (Math.max(...seen) + Math.min(...seen)) / 2;
+      };
+      target.addScaledVector(right, middle(right)).addScaledVector(ahead, middle(up) / ahead.dot(up));
     }
     const eye = target.clone().addScaledVector(away, distance);
     if (!at_once) return this.flyTo(eye, target);
