@@ -344,6 +344,7 @@ const actions = {
   top() {
     stage.setTop(!stage.top);
     press("tool-top", stage.top);
+    if (wantsFit) actions.home();  // all of it was shown: from above, too
   },
   follow() {
     following = robots.next(following);
