@@ -126,6 +126,9 @@ int main(int argc, char** argv) {
     std::cout << status.messages << " messages of " << status.topics << " topics, "
               << status.file_bytes << " bytes in " << status.files << " file(s), " << status.dropped
               << " dropped, " << status.lost << " lost\n";
+    for (const auto& [what, count] : status.left_out_for_rerun) {
+      std::cout << "not in the form for Rerun: " << count << " of " << what << '\n';
+    }
     if (status.dropped > 0) spdlog::error("samples were dropped: the disk is too slow");
     return std::cout.flush() && status.dropped == 0 ? 0 : 1;
   });

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include "pocd/recording/split_writer.hpp"
@@ -30,6 +31,8 @@ struct RecorderStatus {
   std::uint64_t lost = 0;                 ///< not received, as the bus says
   std::size_t topics = 0, files = 0;
   std::size_t waiting_bytes = 0;
+  /// What of markers is not in the form for Rerun, as "TOPIC: what", and how often.
+  std::map<std::string, std::uint64_t> left_out_for_rerun;
 };
 
 /// Follows discovery: every topic that appears and matches is recorded, whatever its type.

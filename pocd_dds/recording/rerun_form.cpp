@@ -109,7 +109,17 @@ struct EdgePoint {
 };
 static_assert(sizeof(EdgePoint) == 20);
 
-void add_edges(const Marker& box, int most_steps, std::vector<EdgePoint>& points) {
+std::string marker_type(std::int32_t type) {
+  static const char* const names[] = {"arrow",  "cube",  "sphere", "cylinder",
+                                      "lines",  "lines", "cubes",  "spheres",
+                                      "points", "text",  "mesh",   "triangles"};
+  const bool known = type >= 0 && type < static_cast<std::int32_t>(std::size(names));
+  return "markers of type " + std::to_string(type) +
+         (known ? " (" + std::string(names[type]) + ")" : "");
+}
+
+/// False, and nothing: its place or size is no number.
+bool add_edges(const Marker& box, int most_steps, std::vector<EdgePoint>& points) {
   const auto& at = box.pose().position();
   const auto& turn = box.pose().orientation();
   const Eigen::Vector3d centre(at.x(), at.y(), at.z());
@@ -117,7 +127,7 @@ void add_edges(const Marker& box, int most_steps, std::vector<EdgePoint>& points
       Eigen::Quaterniond(turn.w(), turn.x(), turn.y(), turn.z()).normalized();
   const Eigen::Vector3d half =
       0.5 * Eigen::Vector3d(box.scale().x(), box.scale().y(), box.scale().z());
-  if (!centre.allFinite() || !rotation.coeffs().allFinite() || !half.allFinite()) return;
+  if (!centre.allFinite() || !rotation.coeffs().allFinite() || !half.allFinite()) return false;
   const std::uint32_t colors = colour_of(box);
   for (int along = 0; along < 3; ++along) {
     const double length = 2.0 * std::abs(half[along]);
@@ -137,6 +147,7 @@ void add_edges(const Marker& box, int most_steps, std::vector<EdgePoint>& points
       }
     }
   }
+  return true;
 }
 
 }  // namespace
@@ -168,8 +179,11 @@ Bytes RerunForm::edges(const visualization_msgs::msg::MarkerArray& array) {
     if (marker.action() != kAdd) continue;
     if (marker.type() != kCube) {
       boxes_.erase(name);
+      ++left_out_[marker_type(marker.type())];
     } else if (boxes_.size() < kMostBoxes || boxes_.count(name) > 0) {
       boxes_[name] = marker;
+    } else {
+      ++left_out_["boxes beyond " + std::to_string(kMostBoxes)];
     }
   }
   if (array.markers().empty()) return {};
@@ -178,7 +192,11 @@ Bytes RerunForm::edges(const visualization_msgs::msg::MarkerArray& array) {
   const int room = static_cast<int>(kMostPoints / (12 * std::max<std::size_t>(boxes_.size(), 1)));
   const int most_steps = std::clamp(room - 1, 1, kMostSteps);
   for (const auto& [name, box] : boxes_) {
-    if (box.header().frame_id() == cloud.header().frame_id()) add_edges(box, most_steps, points);
+    if (box.header().frame_id() != cloud.header().frame_id()) {
+      ++left_out_["boxes in another frame than the last marker of a message"];
+    } else if (!add_edges(box, most_steps, points)) {
+      ++left_out_["boxes whose place or size is no number"];
+    }
   }
   add_field(cloud, "x", offsetof(EdgePoint, x), kFloat32);
   add_field(cloud, "y", offsetof(EdgePoint, y), kFloat32);
@@ -202,6 +220,7 @@ std::optional<Bytes> RerunForm::convert(const Bytes& message) {
     if (cloud && colour(*cloud)) made = encoded<sensor_msgs::msg::PointCloud2PubSubType>(*cloud);
   } else if (kind_ == Kind::kMarkers) {
     const auto array = decoded<visualization_msgs::msg::MarkerArrayPubSubType>(message);
+    if (!array) ++left_out_["damaged messages"];
     if (array) made = edges(*array);
   } else if (const auto odometry = decoded<nav_msgs::msg::OdometryPubSubType>(message)) {
     geometry_msgs::msg::TransformStamped transform;

@@ -28,6 +28,8 @@ class RerunForm {
   /// cloud of their edges, all that stand; a pose of odometry becomes a transform. Nothing where
   /// there is nothing to convert, or the message is damaged.
   std::optional<recording::Bytes> convert(const recording::Bytes& message);
+  /// What convert() has left out so far, by what it was: "markers of type 9 (text)" and so on.
+  const std::map<std::string, std::uint64_t>& left_out() const { return left_out_; }
 
  private:
   enum class Kind { kCloud, kMarkers, kOdometry };
@@ -36,6 +38,7 @@ class RerunForm {
 
   Kind kind_;
   std::map<std::pair<std::string, std::int32_t>, visualization_msgs::msg::Marker> boxes_;
+  std::map<std::string, std::uint64_t> left_out_;
 };
 
 }  // namespace pocd::dds

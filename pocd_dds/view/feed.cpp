@@ -313,7 +313,10 @@ void Feed::Impl::draw_map() {
           told_looks = Clock::now();
           // Those of objects and cameras are the newest that were heard; a map has none of its own.
           if (const auto range = objects.time_range()) stamp_ns = stamp_from(range->second);
-          if (is_new) maker.update(std::move(contents.tiles), run, contents.truncation_m);
+          if (is_new) {
+            maker.update(std::move(contents.tiles), run, contents.voxel_size_m,
+                         contents.truncation_m);
+          }
         }
       }
       looked = Clock::now();

@@ -307,7 +307,7 @@ void Recorded::Impl::draw() {
   const StampNs now_ns = range ? stamp_from(range->second) : static_cast<StampNs>(log_ns);
   drawn_version = replica.version();
   drawn_epoch = *replica.epoch();
-  maker.update(replica.tiles(), run, last_manifest->truncation());
+  maker.update(replica.tiles(), run, last_manifest->voxel_size(), last_manifest->truncation());
   while (!maker.idle() && !stopping) board.put_surfaces(maker.make(kTilesAtOnce), now_ns);
   board.map_known_from(now_ns);
   drawn_ns = now_ns;

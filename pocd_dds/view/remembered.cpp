@@ -130,7 +130,7 @@ void Remembered::draw() {
   for (MapTile& tile : reader_.tiles(damage_)) tiles[tile.key] = std::move(tile);
   const double all = static_cast<double>(std::max<std::size_t>(tiles.size(), 1));
   SurfaceMaker maker;
-  maker.update(std::move(tiles), objects_.run_of(epoch_),
+  maker.update(std::move(tiles), objects_.run_of(epoch_), info_.voxel_size_m,
                info_.truncation_voxels * info_.voxel_size_m);
   while (!maker.idle() && !stopping_) {
     board_.put_surfaces(maker.make(kTilesAtOnce), info_.stamp_ns);

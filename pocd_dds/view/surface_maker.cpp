@@ -5,7 +5,8 @@
 namespace pocd::view {
 namespace {
 
-constexpr int kCoarseVoxels = 4;
+// One cube inside of a tile, and what lies on its sides: every 0.4 m with voxels of 0.05 m.
+constexpr int kCoarseVoxels = 16;
 // 36 KB each. A tile needs its neighbours, of which most are needed again soon.
 constexpr std::size_t kMostDecoded = 512;
 
@@ -25,11 +26,12 @@ void SurfaceMaker::touch(const TileKey& key) {
   decoded_at_.erase(known);
 }
 
-void SurfaceMaker::update(std::map<TileKey, MapTile> tiles, std::uint32_t run,
+void SurfaceMaker::update(std::map<TileKey, MapTile> tiles, std::uint32_t run, double voxel_size_m,
                           double truncation_m) {
   const bool new_run = run != run_;
   std::map<TileKey, MapTile> before = std::move(tiles_);
   tiles_ = std::move(tiles);
+  voxel_size_m_ = voxel_size_m;
   truncation_m_ = truncation_m;
   run_ = run;
   if (new_run) {
@@ -100,7 +102,8 @@ Board::Surfaces SurfaceMaker::make(std::size_t most) {
 void SurfaceMaker::draw(const TileKey& key, Board::Surfaces& out) {
   auto& chunk = drawn_tiles_[chunk_of(key)];
   const auto known = chunk.find(key);
-  const TileMesh mesh = extract_tile_mesh(key, [&](const TileKey& k) { return decoded(k); });
+  const TileMesh mesh =
+      extract_tile_mesh(key, voxel_size_m_, [&](const TileKey& k) { return decoded(k); });
   if (mesh.vertices.empty()) {
     if (known == chunk.end()) return;
     chunk.erase(known);

@@ -16,7 +16,8 @@ namespace pocd::view {
 class SurfaceMaker {
  public:
   /// The map as it is now. `run` counts the runs of the publisher from 1.
-  void update(std::map<TileKey, MapTile> tiles, std::uint32_t run, double truncation_m);
+  void update(std::map<TileKey, MapTile> tiles, std::uint32_t run, double voxel_size_m,
+              double truncation_m);
 
   /// Draws about `most` of the tiles that have changed, whole chunks at a time, and the chunks.
   /// Empty when there is nothing left.
@@ -40,7 +41,7 @@ class SurfaceMaker {
 
   std::map<TileKey, MapTile> tiles_;
   std::uint32_t run_ = 0;
-  double truncation_m_ = 0.0;
+  double voxel_size_m_ = 0.0, truncation_m_ = 0.0;
   std::map<ChunkKey, std::set<TileKey>> dirty_tiles_;
   std::set<ChunkKey> dirty_chunks_;
   std::map<ChunkKey, std::map<TileKey, Drawn>> drawn_tiles_;

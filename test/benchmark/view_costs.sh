@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What clients of pocd_view cost: a node goes on with the memory of a large place, and ten clients and a page open it; then
-# ten clients follow two robots in a small one. By hand, not a test; it needs npm and, for the page, chromium.
+# What clients of pocd_view cost: a node goes on with the memory of a large place, and ten clients and a page open it.
+# Prints the table of docs/view.md. By hand, not a test; it needs npm and, for the page, chromium.
 # usage: view_costs.sh BUILD_DIR BIN_DIR OUTPUT_DIR [AREA_M2 (10000)] [CLIENTS (10)]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -35,19 +35,13 @@ view
 node "$output/costs.js" "$port" --until-drawn
 cpu() { awk '{print ($14 + $15) / 100}' "/proc/$server/stat"; }
 rss() { sed -n 's/^VmRSS:[^0-9]*\([0-9]*\) kB/\1/p' "/proc/$server/status"; }
-echo "$area m2: pocd_view has fetched and drawn all of the map after $(echo "$(date +%s.%N) - $start" | bc | cut -c1-5) s, $(cpu) s of CPU, $(($(rss) / 1024)) MB"
+printf '| %s m2 | |\n|---|---|\n' "$area"
+echo "| \`pocd_view\`, until all of the map is fetched and drawn | $(echo "$(date +%s.%N) - $start" | bc | cut -d. -f1) s, $(cpu | cut -d. -f1) s of CPU, $(($(rss) / 1024)) MB |"
 node "$output/costs.js" "$port" "$server" "$clients" 10
 if command -v chromium >/dev/null; then
-  node "$output/first_picture.js" "$(command -v chromium)" "$address" "$output/large.png"
+  node "$output/first_picture.js" "$(command -v chromium)" "$address" "$output/large.png" 2>>"$output/chromium.log"
+else
+  echo "| a page in Chromium | not measured: it is not installed |"
 fi
+echo "load of the machine meanwhile: $(cut -d' ' -f1 /proc/loadavg)" >&2
 kill "$server" "$node" && wait "$server" "$node" || true
-
-echo "two robots in a small place (config/sim/demo.yaml), at their pace:"
-"$bin/pocd_node" --config config/simulated.yaml --robot robot1 --robot robot2 >"$output/node.log" 2>&1 &
-node=$! && processes+=("$node")
-view
-"$bin/pocd_play" --dataset sim --input config/sim/demo.yaml --no-color >"$output/play.log" 2>&1 &
-play=$! && processes+=("$play")
-sleep 5
-before=$(cpu)
-node "$output/costs.js" "$port" "$server" "$clients" 25 | tail -n 1

@@ -178,6 +178,32 @@ TEST(RerunForm, WhatStandsIsWhatMarkersHaveAddedUpTo) {
   EXPECT_FALSE(form->convert(markers({})));
 }
 
+TEST(RerunForm, WhatIsLeftOutIsCountedByName) {
+  auto form = RerunForm::of(topic(topics::kMarkers));
+  form->convert(markers({box(1, 0.0)}));
+  EXPECT_TRUE(form->left_out().empty());
+  Marker text = box(2, 0.0), unknown = box(3, 0.0), elsewhere = box(4, 0.0);
+  text.type(9);
+  unknown.type(77);
+  elsewhere.header().frame_id("odom");
+  const Marker nowhere = box(5, std::numeric_limits<double>::quiet_NaN());
+  form->convert(markers({text, text, unknown, elsewhere, nowhere, box(6, 1.0)}));
+  form->convert(Bytes{0, 1, 0, 0, 7});
+  const std::map<std::string, std::uint64_t> expected{
+      {"markers of type 9 (text)", 2},
+      {"markers of type 77", 1},
+      {"boxes in another frame than the last marker of a message", 1},
+      {"boxes whose place or size is no number", 1},
+      {"damaged messages", 1}};
+  EXPECT_EQ(form->left_out(), expected);
+  std::vector<Marker> many;
+  for (std::int32_t i = 0; i < 20010; ++i) many.push_back(box(i, 0.1 * i));
+  many[4].header().frame_id("map");
+  auto full = RerunForm::of(topic(topics::kMarkers));
+  full->convert(markers(many));
+  EXPECT_EQ(full->left_out(), (std::map<std::string, std::uint64_t>{{"boxes beyond 20000", 10}}));
+}
+
 TEST(RerunForm, OfManyBoxesTheEdgesHaveFewerPoints) {
   auto form = RerunForm::of(topic(topics::kMarkers));
   std::vector<Marker> many;

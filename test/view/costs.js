@@ -1,5 +1,5 @@
 // What clients of pocd_view cost: connects CLIENTS clients of the page's protocol at once and says how long each
-// takes to the first surface and to the whole map, the bytes that it gets, and the CPU of the server.
+// takes to the first surface and to the whole map, the bytes that it gets, and the CPU of the server, as rows of a table.
 // Usage: costs.js PORT PID_OF_SERVER CLIENTS SECONDS_AFTER
 //        costs.js PORT --until-drawn     ends when the server has drawn all of the map
 "use strict";
@@ -81,14 +81,12 @@ const range = (list, digits) => {
   const all = Array.from({ length: clients }, () => new Client());
   while (!all.every((one) => one.last && Date.now() - one.last > kQuiet_ms)) await wait(50);
   const loaded = cpu();
-  console.log(`${clients} clients, each:`);
-  console.log(`  first surface after [s]: ${range(all.map((one) => (one.first - one.start) / 1000), 2)}`);
-  console.log(`  all of them after [s]: ${range(all.map((one) => (one.last - one.start) / 1000), 1)}`);
-  console.log(`  surfaces: ${range(all.map((one) => one.surfaces), 0)}, of which fine tiles ${range(all.map((one) => one.tiles), 0)}, in ${range(all.map((one) => one.chunks.size), 0)} chunks`);
-  console.log(`  received [MB]: ${range(all.map((one) => one.bytes / 1e6), 2)}`);
-  console.log(`CPU of the server for all of that [s]: ${(loaded - before).toFixed(2)}`);
+  const row = (name, value) => console.log(`| ${name} | ${value} |`);
+  row("a client gets", `${range(all.map((one) => one.bytes / 1e6), 1)} MB: the coarse surface of ${range(all.map((one) => one.chunks.size), 0)} chunks, and ${range(all.map((one) => one.tiles), 0)} fine tiles near the camera`);
+  row(`\`pocd_view\` spends on all ${clients}`, `${(loaded - before).toFixed(1)} s of CPU: what is sent has been drawn and compressed before`);
+  row("from connecting to the first surface; to all of them", `${range(all.map((one) => (one.first - one.start) / 1000), 2)} s; ${range(all.map((one) => (one.last - one.start) / 1000), 1)} s`);
   const bytes = all.map((one) => one.bytes);
   await wait(1000 * seconds);
-  console.log(`then, for ${seconds} s: ${range(all.map((one, i) => (one.bytes - bytes[i]) / 1e3 / seconds), 2)} KB/s each, server ${(100 * (cpu() - loaded) / seconds).toFixed(1)} % of a processor`);
+  row("then, while nothing changes", `${range(all.map((one, i) => (one.bytes - bytes[i]) / 1e3 / seconds), 2)} KB/s each, ${(100 * (cpu() - loaded) / seconds).toFixed(1)} % of a processor for all of them`);
   process.exit(0);
 })();

@@ -208,6 +208,9 @@ main(async () => {
   const paused = await page.evaluate(() => [window.pocd.time.playing, window.pocd.time.at]);
   check(!paused[0] && paused[1] !== null, "it pauses");
   await page.keyboard.press("n");
+  await holds("all tiles are back after playing", (now) => window.pocd.surface.tileCount === now && ![...window.pocd.surface.chunks.values()].some((chunk) => chunk.dirty), counts.tiles);
+  const asPlayed = await difference(asNow, await picture());
+  check(asPlayed < 0.01, `now looks as it did before playing: ${asPlayed}`);
 
   await page.keyboard.press("d");
   await shot("light");

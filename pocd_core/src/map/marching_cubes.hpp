@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -22,5 +23,26 @@ using CellTriangles = std::vector<std::array<std::uint8_t, 3>>;
 /// no holes (the flaw of the 15-case table of Lorensen and Cline 1987; see Nielson and Hamann
 /// 1991).
 const std::array<CellTriangles, 256>& cell_cases();
+
+/// A zero crossing between voxels that differ by more is no surface but a tear: it lies between the
+/// band behind a silhouette and free space that was seen from elsewhere. In units of the distances
+/// of which one voxel is `per_voxel`: four voxels, and a thousandth for the rounding of distances.
+inline float torn_beyond(float per_voxel) { return 4.004f * per_voxel; }
+
+/// Calls triangle(e0, e1, e2), edges of the cell, for what of the surface lies in a cell whose
+/// corners have these distances; triangles across a tear are left out.
+template <class Triangle>
+void for_each_triangle(const std::array<float, 8>& distance, float torn, const Triangle& triangle) {
+  int inside = 0;
+  for (int c = 0; c < 8; ++c) inside |= (distance[c] < 0.0f ? 1 : 0) << c;
+  if (inside == 0 || inside == 255) return;
+  const auto is_torn = [&](int edge) {
+    const int low = kCellEdges[edge].low;
+    return std::abs(distance[low] - distance[low | 1 << kCellEdges[edge].axis]) > torn;
+  };
+  for (const auto& t : cell_cases()[inside]) {
+    if (!is_torn(t[0]) && !is_torn(t[1]) && !is_torn(t[2])) triangle(t[0], t[1], t[2]);
+  }
+}
 
 }  // namespace pocd

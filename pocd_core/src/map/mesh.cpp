@@ -76,26 +76,20 @@ void make_vertices(MapReader& map, const BlockKey& key, double voxel_m, int min_
 
 // Calls triangle(i, j, k) with (block offset 0..7, code) pairs packed as 2048 * offset + code.
 template <class Triangle>
-void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight, int torn_tsdf,
+void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight, float torn_tsdf,
                        const Triangle& triangle) {
   PaddedBlock block;
   fill(map, key, min_weight, block);
   for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
     const int x = v & 7, y = v >> 3 & 7, z = v >> 6;
-    int inside = 0;
+    std::array<float, 8> tsdf;
     bool complete = true;
     for (int c = 0; c < 8; ++c) {
       const int i = padded_index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
       complete &= block.valid[i];
-      inside |= (block.tsdf[i] < 0 ? 1 : 0) << c;
+      tsdf[c] = block.tsdf[i];
     }
-    if (!complete || inside == 0 || inside == 255) continue;
-    const auto torn = [&](int edge) {
-      const int low = kCellEdges[edge].low, high = low | 1 << kCellEdges[edge].axis;
-      const int a = block.tsdf[padded_index(x + (low & 1), y + (low >> 1 & 1), z + (low >> 2))];
-      const int b = block.tsdf[padded_index(x + (high & 1), y + (high >> 1 & 1), z + (high >> 2))];
-      return std::abs(a - b) > torn_tsdf;
-    };
+    if (!complete) continue;
     const auto locate = [&](int edge) {
       const int low = kCellEdges[edge].low;
       const int ex = x + (low & 1), ey = y + (low >> 1 & 1), ez = z + (low >> 2);
@@ -103,10 +97,8 @@ void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight, int 
       return 2048 * offset + 3 * ((ex & 7) + kSide * ((ey & 7) + kSide * (ez & 7))) +
              kCellEdges[edge].axis;
     };
-    for (const auto& t : cell_cases()[inside]) {
-      if (!torn(t[0]) && !torn(t[1]) && !torn(t[2]))
-        triangle(locate(t[0]), locate(t[1]), locate(t[2]));
-    }
+    pocd::for_each_triangle(
+        tsdf, torn_tsdf, [&](int i, int j, int k) { triangle(locate(i), locate(j), locate(k)); });
   }
 }
 
@@ -142,8 +134,8 @@ Mesh compact(const std::vector<BlockMesh>& parts, const std::vector<std::uint32_
 Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool) {
   const int threshold = std::max(min_weight, 1);
   const double voxel_m = map.config().voxel_size_m;
-  const int torn_tsdf = static_cast<int>(kTornVoxels * kTsdfScale /
-                                         static_cast<float>(map.config().truncation_voxels));
+  const float torn_tsdf =
+      torn_beyond(kTsdfScale / static_cast<float>(map.config().truncation_voxels));
   // Region by region, so that none has to be read from disk often.
   const std::vector<BlockKey> keys = map.keys_by_region();
   const auto before = [](const BlockKey& a, const BlockKey& b) {

@@ -64,21 +64,22 @@ Eigen::Vector3f gradient(const PaddedTile& tile, int at) {
 
 class Mesher {
  public:
-  Mesher(const PaddedTile& tile, TileMesh& mesh)
-      : tile_(tile), mesh_(mesh), vertex_of_(3 * kCorners * kCorners * kCorners, kNoVertex) {}
+  Mesher(const PaddedTile& tile, float torn_m, TileMesh& mesh)
+      : tile_(tile),
+        torn_m_(torn_m),
+        mesh_(mesh),
+        vertex_of_(3 * kCorners * kCorners * kCorners, kNoVertex) {}
 
   void cell(int x, int y, int z) {
-    int inside = 0;
+    std::array<float, 8> distance;
     for (int c = 0; c < 8; ++c) {
       const int at = padded(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
       if (tile_.observed[at] == 0) return;
-      inside |= (tile_.distance[at] < 0.0f ? 1 : 0) << c;
+      distance[c] = tile_.distance[at];
     }
-    if (inside == 0 || inside == 255) return;
-    for (const auto& t : cell_cases()[inside]) {
-      mesh_.triangles.push_back(
-          {vertex(x, y, z, t[0]), vertex(x, y, z, t[1]), vertex(x, y, z, t[2])});
-    }
+    for_each_triangle(distance, torn_m_, [&](int i, int j, int k) {
+      mesh_.triangles.push_back({vertex(x, y, z, i), vertex(x, y, z, j), vertex(x, y, z, k)});
+    });
   }
 
  private:
@@ -105,6 +106,7 @@ class Mesher {
   }
 
   const PaddedTile& tile_;
+  const float torn_m_;
   TileMesh& mesh_;
   std::vector<std::uint32_t> vertex_of_;
 };
@@ -122,7 +124,7 @@ void for_each_neighbour(const TileKey& key, const Use& use) {
 
 }  // namespace
 
-TileMesh extract_tile_mesh(const TileKey& key, const TileLookup& tile_of) {
+TileMesh extract_tile_mesh(const TileKey& key, double voxel_size_m, const TileLookup& tile_of) {
   TileMesh mesh;
   if (tile_of(key) == nullptr) return mesh;
   PaddedTile tile;
@@ -130,7 +132,7 @@ TileMesh extract_tile_mesh(const TileKey& key, const TileLookup& tile_of) {
     const DecodedTile* decoded = tile_of(neighbour);
     if (decoded != nullptr) copy_from(*decoded, dx, dy, dz, tile);
   });
-  Mesher mesher(tile, mesh);
+  Mesher mesher(tile, torn_beyond(static_cast<float>(voxel_size_m)), mesh);
   for (int z = 0; z < kTileSide; ++z) {
     for (int y = 0; y < kTileSide; ++y) {
       for (int x = 0; x < kTileSide; ++x) mesher.cell(x, y, z);
@@ -159,7 +161,9 @@ TileMesh coarsened(const TileMesh& mesh, int cell_voxels) {
   for (const TileVertex& vertex : mesh.vertices) {
     std::array<int, 3> cell;
     for (int i = 0; i < 3; ++i) {
-      cell[i] = static_cast<int>(vertex.position_voxels[i]) / cell_voxels;
+      // What lies on the border to a neighbour stays there: the neighbour has the same vertices.
+      const float at = vertex.position_voxels[i];
+      cell[i] = at <= 0.0f ? -1 : at >= kTileSide ? kTileSide : static_cast<int>(at) / cell_voxels;
     }
     Cluster& cluster = clusters[cell];
     ++cluster.count;

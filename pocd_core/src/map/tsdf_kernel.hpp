@@ -26,9 +26,6 @@ constexpr float kConflictVoxels = 2.0f;
 constexpr float kBehindVoxels = 1.25f;
 /// So many looks make free space known: what lies farther behind a surface stays free then.
 constexpr int kKnownFreeWeight = 3;
-/// A zero crossing between voxels that differ by more is no surface: it lies between the band behind
-/// a silhouette and free space that was seen from elsewhere [voxels].
-constexpr float kTornVoxels = 4.0f;
 /// Free space is not believed where a pixel this near saw something closer: poses are not exact,
 /// and thin things would lose voxels at their outline [pixels].
 constexpr int kEdgeGuard_px = 2;

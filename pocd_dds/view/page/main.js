@@ -22,12 +22,13 @@ let before = null;    // those of the marker "since", for the left half
 let other = null;     // the map of then for the left half: {connection, surface}
 let drawn = false, cut = Infinity, restored = false;
 
-const times = { first: null, last: null };  // of the first picture with a map, and of the last surface [ms]
+// When the first picture with a map was there, when the last one with a new surface, and when that surface came [ms].
+const times = { first: null, whole: null, last: null };
 
+const connection = new Connection(use, (link) => health.setLink(link));
 const stage = new Stage($("canvas"));
 const store = new ObjectStore();
 const health = new Health();
-const connection = new Connection(use, (link) => health.setLink(link));
 const surface = new Surface(stage.scene, (list) => connection.wish("want", list));
 const layers = { now: new ObjectLayer(stage.scene), before: new ObjectLayer(stage.scene) };
 layers.before.group.visible = false;
@@ -221,6 +222,7 @@ stage.resizers.push((width, height, pixels) => {
   for (const one of [layers.now, layers.before, robots.lines, grid, tape]) one.resize(width, height, pixels);
 });
 stage.before.push((now) => {
+  if (!fitted && times.last) adapt();
   if (!drawn) {
     drawObjects(now);
     if (drawn) stage.askSoon();
@@ -231,7 +233,10 @@ stage.before.push((now) => {
   if (followed && robots.moved) stage.follow(robots.moved.from, pose(followed));
   robots.moved = null;
   const reach = Math.max(60, 6 * stage.camera.position.distanceTo(stage.controls.target));
-  if (surface.update(stage.camera.position, reach)) stage.askSoon();
+  if (surface.update(stage.camera.position, reach)) {
+    times.last = performance.now();
+    stage.askSoon();
+  }
   if (other?.surface.update(stage.camera.position, reach)) stage.askSoon();
   time.draw(theme);
   panel.update(time.range ? time.range[1] : 0);
@@ -248,23 +253,39 @@ stage.halves.push((part) => {
 });
 const rightLabels = () => layers.now.labels.concat(robots.labels, tapeLabels());
 stage.after.push(() => {
-  if (!times.first && times.last) times.first = performance.now();
   const placed = stage.split ? [{ labels: layers.before.labels, offset: 0 }, { labels: rightLabels(), offset: stage.partWidth }]
     : [{ labels: rightLabels(), offset: 0 }];
   labels.place(placed, selected);
 });
 
-// Several times a second: what depends on where the camera is, and the first picture.
-setInterval(() => {
-  surface.chooseDetail(stage.camera.position, stage.controls.target);
-  other?.surface.chooseDetail(stage.camera.position, stage.controls.target);
+let showsNew = false;  // the frame that is under way shows a surface that the one before did not
+let shownLast = null;
+stage.after.push(() => {
+  showsNew = times.last !== shownLast;
+  shownLast = times.last;
+});
+stage.finished.push(() => {
+  if (!showsNew) return;
+  times.whole = performance.now();
+  times.first ??= times.whole;
+});
+
+/** Bounds of the map and its objects; null when there is no map. Objects come first: with them the first picture is of all. */
+function extent() {
   const bounds = surface.bounds();
+  if (bounds && !then) for (const { box } of store.objects.values()) bounds.expandByPoint(new THREE.Vector3(box[0], box[1], box[2]));
+  return bounds;
+}
+
+function adapt() {
+  for (const one of [surface, other?.surface]) one?.chooseDetail(stage.camera.position, stage.controls.target, stage.focal, stage.software);
+  const bounds = extent();
   $("empty").hidden = Boolean(bounds) || store.objects.size > 0;
   health.show();
   if (!bounds) return;
   drawGrid(bounds);
   if ((wantsFit && !stage.touched && !restored) && !(fitted && fitted.containsBox(bounds))) {
-    stage.fit(bounds, !fitted);
+    stage.fit(bounds, !fitted || stage.software);
     fitted = bounds.clone().expandByScalar(0.3);
   }
   const top = Math.max(0.1, bounds.max.z), share = Number($("cut-range").value) / 100;
@@ -275,7 +296,8 @@ setInterval(() => {
     $("cut-value").textContent = Number.isFinite(cut) ? `${cut.toFixed(1)} m` : "off";
     stage.ask();
   }
-}, 250);
+}
+setInterval(adapt, 250);  // to where the camera is
 
 /** Metres on the ground: every one of a room, every ten of a hall. */
 let gridded = "";
@@ -316,12 +338,13 @@ function hint(text) {
 const actions = {
   home() {
     wantsFit = true;
-    const bounds = surface.bounds();
+    const bounds = extent();
     if (bounds) stage.fit(bounds);
   },
   top() {
     stage.setTop(!stage.top);
     press("tool-top", stage.top);
+    if (wantsFit) actions.home();  // all of it was shown: from above, too
   },
   follow() {
     following = robots.next(following);

@@ -1,18 +1,23 @@
 // Camera, controls and frames: what is drawn from where, and where a click leads.
 import * as THREE from "./three/build/three.module.js";
 import { OrbitControls } from "./three/examples/jsm/controls/OrbitControls.js";
+import { contextOf } from "./gl.js";
 
 THREE.Object3D.DefaultUp.set(0, 0, 1);
 const kFlight = 650;  // [ms]
 const kDataFrame = 80;  // between frames that show new data only [ms]
+const kSlow = 100;      // a frame that takes longer is too slow for a flight [ms]
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 export class Stage {
   /** `frame(camera, rect)` is called before each frame is drawn, once, or once per half. */
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "low-power" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const { gl, software } = contextOf(canvas);
+    this.gl = gl;
+    this.software = software;
+    this.renderer = new THREE.WebGLRenderer({ canvas, context: gl });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, software ? 1 : 2));
     this.renderer.autoClear = false;
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(45, 1, 0.1, 2000);
@@ -30,6 +35,9 @@ export class Stage {
     this.asked = true;
     this.askedSoon = false;
     this.drawnAt = 0;
+    this.cost = 0;         // of the last frame, until it was really drawn [ms]
+    this.underWay = null;  // a fence behind the frame that is being drawn
+    this.finished = [];    // called when a frame was really drawn
     this.before = [];      // called before a frame; true: another frame is wanted
     this.halves = [];      // called with "whole", "left" or "right" before that part is drawn
     this.after = [];
@@ -54,19 +62,26 @@ export class Stage {
     this.ask();
   }
 
+  /** Pixels of a length of one metre at a distance of one metre. */
+  get focal() { return this.height / 2 / Math.tan(THREE.Math.degToRad(this.camera.fov / 2)); }
   get partWidth() { return this.split ? this.width / 2 : this.width; }
 
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
     if (document.hidden) return;
-    if (this.flight) this.fly(now);
+    // One frame is under way at most: a slow machine stays usable.
+    const ready = this.isDrawn();
+    if (ready && this.flight) this.fly(now);
     let more = false;
     for (const step of this.before) more = step(now) || more;
-    const due = this.askedSoon && now - this.drawnAt > kDataFrame;
-    if (!this.asked && !more && !due) return;
-    this.asked = more;
+    if (more) this.ask();
+    if (!ready) return;
+    // New data alone takes half of the time.
+    const due = this.askedSoon && performance.now() - this.drawnAt > Math.max(kDataFrame, 2 * this.cost);
+    if (!this.asked && !due) return;
+    this.asked = false;
     this.askedSoon = false;
-    this.drawnAt = now;
+    this.drawnAt = performance.now();
     this.camera.aspect = this.partWidth / this.height;
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
@@ -83,12 +98,29 @@ export class Stage {
       this.renderer.render(this.scene, this.camera);
     });
     for (const step of this.after) step();
+    if (this.gl.fenceSync) {
+      this.underWay = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+      this.gl.flush();
+    } else {
+      for (const step of this.finished) step();
+    }
+  }
+
+  /** The last frame is no longer under way. */
+  isDrawn() {
+    if (!this.underWay) return true;
+    if (this.gl.clientWaitSync(this.underWay, 0, 0) === this.gl.TIMEOUT_EXPIRED) return false;
+    this.gl.deleteSync(this.underWay);
+    this.underWay = null;
+    this.cost = performance.now() - this.drawnAt;
+    for (const step of this.finished) step();
+    return true;
   }
 
   fly(now) {
     const flight = this.flight;
     flight.start ??= now;
-    const t = still ? 1 : Math.min(1, (now - flight.start) / kFlight);
+    const t = still || this.cost > kSlow ? 1 : Math.min(1, (now - flight.start) / kFlight);
     const s = t * t * (3 - 2 * t);
     this.camera.position.lerpVectors(flight.fromEye, flight.toEye, s);
     this.controls.target.lerpVectors(flight.fromTarget, flight.toTarget, s);
@@ -112,13 +144,27 @@ export class Stage {
 
   /** The whole box in the picture. */
   fit(box, at_once = false) {
-    const size = box.getSize(new THREE.Vector3()), target = box.getCenter(new THREE.Vector3());
+    const target = box.getCenter(new THREE.Vector3());
     target.z = Math.min(target.z, box.min.z + 1);
-    const half = Math.tan(THREE.Math.degToRad(this.camera.fov / 2)), aspect = this.partWidth / this.height;
-    const flat = this.top ? Math.max(size.y / 2, size.x / 2 / aspect) : Math.max(0.31 * (size.x + size.y), 0.48 * Math.hypot(size.x, size.y) / aspect);
-    const distance = Math.max(2, 1.06 * flat / half);
     const away = this.top ? new THREE.Vector3(0, -0.001, 1) : new THREE.Vector3(-0.5, -0.72, 0.82).normalize();
-    const eye = target.clone().addScaledVector(away.normalize(), distance);
+    away.normalize();
+    // As far as it takes for all corners, and 4 % more.
+    const right = new THREE.Vector3(0, 0, 1).cross(away).normalize(), up = away.clone().cross(right);
+    const half = Math.tan(THREE.Math.degToRad(this.camera.fov / 2)), aspect = this.partWidth / this.height;
+    const ahead = this.top ? new THREE.Vector3(0, 1, 0) : up.clone().setZ(0).normalize();
+    let distance = 2;
+    for (let turn = 0; turn < 3; ++turn) {
+      const corners = Array.from({ length: 8 }, (_, i) => new THREE.Vector3(i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y, i & 4 ? box.max.z : box.min.z).sub(target));
+      distance = Math.max(2, ...corners.map((c) => 1.04 * Math.max(Math.abs(c.dot(right)) / aspect, Math.abs(c.dot(up))) / half + c.dot(away)));
+      if (turn === 2) break;
+      // What is near looks larger: the middle of the picture is not the middle of the box.
+      const middle = (axis) => {
+        const seen = corners.map((c) => c.dot(axis) / (distance - c.dot(away)));
+        return distance * (Math.max(...seen) + Math.min(...seen)) / 2;
+      };
+      target.addScaledVector(right, middle(right)).addScaledVector(ahead, middle(up) / ahead.dot(up));
+    }
+    const eye = target.clone().addScaledVector(away, distance);
     if (!at_once) return this.flyTo(eye, target);
     this.flight = null;
     this.camera.position.copy(eye);

@@ -4,9 +4,13 @@ import * as THREE from "./three/build/three.module.js";
 const kSteps = 15, kTileVoxels = 16, kChunkTiles = 4;
 const kChunkVoxels = kTileVoxels * kChunkTiles;
 const kPalette = 256;         // side of the texture with one colour per owner
-const kRebuildsPerFrame = 4;  // chunks
+const kRebuilding = 8;        // in each frame [ms]
+const kCoarseCell = 8;        // voxels between vertices of a coarse surface
+const kLargestCell = 3;       // pixels: where it looks larger, the fine surface is wanted
+const kLargestOfSoftware = 12;
 const coarsePointer = matchMedia("(pointer: coarse)").matches;
-const kMostFine = coarsePointer ? 96 : 400;  // chunks
+const kMostFine = 400, kFewFine = 96;  // chunks
+const kSphere = new THREE.Sphere(new THREE.Vector3().setScalar(kSteps * kChunkVoxels / 2), kSteps * kChunkVoxels);
 
 const vertexShader = `
 precision highp float;
@@ -78,6 +82,12 @@ export class Surface {
     this.material = material(0);
     this.unlooked = material(1);  // of chunks that nobody has looked at since the restart
     this.sectors = new Map();     // "x/y/z" -> keys of such chunks
+    // A triangle without area: the shader is made ready while the first surfaces are on their way.
+    const nothing = new THREE.BufferGeometry();
+    for (const name of ["position", "normal"]) nothing.setAttribute(name, new THREE.BufferAttribute(new Float32Array(12), 4));
+    this.first = new THREE.Mesh(nothing, this.material);
+    this.first.frustumCulled = false;
+    this.group.add(this.first);
     this.lastWish = "";
     this.tileCount = 0;
     this.triangles = 0;
@@ -192,6 +202,7 @@ export class Surface {
     }
     const position = new Uint16Array(4 * vertices), normal = new Int8Array(4 * vertices);
     const index = vertices > 65535 ? new Uint32Array(indices) : new Uint16Array(indices);
+    const box = new THREE.Box3(), corner = new THREE.Vector3();
     let v = 0, i = 0;
     for (const { surface, run, dx, dy, dz } of parts) {
       const slots = [...surface.owners].map((owner) => this.slotOf(run, owner));
@@ -204,6 +215,7 @@ export class Surface {
         position[to + 1] = words[from + 1] + oy;
         position[to + 2] = words[from + 2] + oz;
         position[to + 3] = slots[words[from + 3]] ?? 0;
+        box.expandByPoint(corner.set(position[to], position[to + 1], position[to + 2]));
         normal[to] = bytes[12 * n + 8];
         normal[to + 1] = bytes[12 * n + 9];
         normal[to + 2] = bytes[12 * n + 10];
@@ -217,6 +229,8 @@ export class Surface {
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 4));
     geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 4, true));
     geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    geometry.boundingBox = box;
+    geometry.boundingSphere = kSphere;
     return geometry;
   }
 
@@ -228,6 +242,7 @@ export class Surface {
       chunk[level] = null;
     }
     if (geometry) {
+      this.group.remove(this.first);
       chunk[level] = new THREE.Mesh(geometry, this.material);
       this.triangles += geometry.index.count / 3;
       this.group.add(chunk[level]);
@@ -256,13 +271,17 @@ export class Surface {
     return new THREE.Vector3(chunk.x, chunk.y, chunk.z).addScalar(0.5).multiplyScalar(kChunkVoxels * this.voxel);
   }
 
-  /** Asks for the nearest chunks finely, and forgets the tiles of the others. */
-  chooseDetail(eye, target) {
+  /**
+   * Asks for the chunks finely whose coarse surface would look coarse, the nearest ones first, and forgets the tiles of the others.
+   * `focal`: pixels of a metre at a distance of a metre; `software`: the processor draws, and less of it.
+   */
+  chooseDetail(eye, target, focal, software) {
+    const reach = kCoarseCell * this.voxel * focal / (software ? kLargestOfSoftware : kLargestCell) + kChunkVoxels * this.voxel;
     const sorted = [...this.chunks.values()].map((chunk) => {
-      const c = this.centre(chunk);
-      return [Math.min(c.distanceTo(eye), c.distanceTo(target)), chunk];
-    }).sort((a, b) => a[0] - b[0]);
-    const wanted = sorted.slice(0, kMostFine).map(([, chunk]) => chunk);
+      const c = this.centre(chunk), far = c.distanceTo(eye);
+      return [Math.min(far, c.distanceTo(target)), chunk, far];
+    }).filter(([, , far]) => far < reach).sort((a, b) => a[0] - b[0]);
+    const wanted = sorted.slice(0, coarsePointer || software ? kFewFine : kMostFine).map(([, chunk]) => chunk);
     const set = new Set(wanted);
     for (const chunk of this.chunks.values()) {
       if (chunk.wanted && !set.has(chunk)) {
@@ -286,8 +305,11 @@ export class Surface {
     this.uniforms.eye.value.copy(eye);
     this.uniforms.reach.value = reach;
     let rebuilt = 0;
+    const start = performance.now();
     for (const chunk of this.chunks.values()) {
-      if (!chunk.dirty || rebuilt >= kRebuildsPerFrame) continue;
+      // One that is shown coarsely waits until all of its tiles are there.
+      if (!chunk.dirty || (chunk.coarse && !chunk.done && !chunk.fine)) continue;
+      if (performance.now() - start > kRebuilding) break;
       chunk.dirty = false;
       ++rebuilt;
       const parts = [...chunk.tiles.values()];
@@ -303,7 +325,6 @@ export class Surface {
     for (const chunk of this.chunks.values()) {
       for (const mesh of [chunk.coarse, chunk.fine]) {
         if (!mesh) continue;
-        if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
         box.union(mesh.geometry.boundingBox.clone().applyMatrix4(mesh.matrixWorld));
       }
     }

@@ -13,17 +13,16 @@
 namespace pocd::testing {
 namespace {
 
-/// Tiles of two spheres that overlap and reach over the borders of tiles, published as they would
-/// be.
-std::map<TileKey, MapTile> two_spheres(const TsdfConfig& config) {
+/// Tiles of a surface that reaches over the borders of tiles, published as they would be.
+/// `distance_m` of a point in the map frame.
+template <class Distance>
+std::map<TileKey, MapTile> tiles_of(const TsdfConfig& config, const Distance& distance_m) {
   TsdfMap map(config);
   for (int z = -20; z < 20; ++z) {
     for (int y = -20; y < 20; ++y) {
       for (int x = -26; x < 26; ++x) {
         const Eigen::Vector3d p = Eigen::Vector3d(x + 0.5, y + 0.5, z + 0.5) * config.voxel_size_m;
-        const double d = std::min((p - Eigen::Vector3d(0.4, 0.1, 0)).norm(),
-                                  (p + Eigen::Vector3d(0.3, 0, 0.1)).norm()) -
-                         0.55;
+        const double d = distance_m(p);
         VoxelBlock& block = map.touch({x >> 3, y >> 3, z >> 3});
         const int v = (x & 7) + 8 * ((y & 7) + 8 * (z & 7));
         block.weight[v] = 5;
@@ -36,6 +35,14 @@ std::map<TileKey, MapTile> two_spheres(const TsdfConfig& config) {
   MapPublisher publisher(1, config);
   publisher.update(map);
   return publisher.tiles();
+}
+
+std::map<TileKey, MapTile> two_spheres(const TsdfConfig& config) {
+  return tiles_of(config, [](const Eigen::Vector3d& p) {
+    return std::min((p - Eigen::Vector3d(0.4, 0.1, 0)).norm(),
+                    (p + Eigen::Vector3d(0.3, 0, 0.1)).norm()) -
+           0.55;
+  });
 }
 
 struct Decoded {
@@ -72,7 +79,7 @@ TEST(TileMesh, TilesTogetherAreTheSurfaceOfTheMap) {
   std::vector<Triangle> pieces, whole;
   std::size_t owners[3] = {};
   for (const auto& [key, tile] : tiles) {
-    const TileMesh mesh = extract_tile_mesh(key, std::cref(decoded));
+    const TileMesh mesh = extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded));
     const Eigen::Vector3f origin =
         (kTileSide * Eigen::Vector3f(static_cast<float>(key.x), static_cast<float>(key.y),
                                      static_cast<float>(key.z)) +
@@ -112,6 +119,51 @@ TEST(TileMesh, TilesTogetherAreTheSurfaceOfTheMap) {
   EXPECT_LT(different, whole.size() / 50);
 }
 
+// A thing whose front, at x = 0, is known three voxels deep: free space that was seen from the side
+// lies behind the band. The tiles have the front, and not the end of the band, as the map's mesh
+// has.
+TEST(TileMesh, TheEndOfABandInFreeSpaceIsNoSurface) {
+  const TsdfConfig config = coarse_config();
+  const auto tiles = tiles_of(config, [](const Eigen::Vector3d& p) {
+    const bool band = std::abs(p.y()) < 0.2 && p.x() > -0.2 && p.x() < 0.15;
+    return band ? -p.x() : 0.2;
+  });
+  const Decoded decoded(tiles, config.truncation_m());
+  std::size_t triangles = 0;
+  for (const auto& [key, tile] : tiles) {
+    const TileMesh mesh = extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded));
+    triangles += mesh.triangles.size();
+    for (const TileVertex& vertex : mesh.vertices) {
+      const double x = config.voxel_size_m * (16.0 * key.x + 0.5 + vertex.position_voxels.x());
+      EXPECT_LT(x, 0.11) << "the back of the band, towards what was seen free";
+    }
+  }
+  EXPECT_GT(triangles, 100u);
+  const Mesh whole = extract_mesh(tiles, config.voxel_size_m, config.truncation_m());
+  EXPECT_EQ(triangles, whole.triangles.size());
+}
+
+// Neighbours differ by 126, 127 or 128 steps of the tiles' distances, of which 127 are four voxels.
+TEST(TileMesh, TearsAreThoseOfTheMap) {
+  const TsdfConfig config = coarse_config();
+  ASSERT_EQ(config.truncation_voxels, 4.0);
+  Random random(7);
+  const auto tiles = tiles_of(config, [&](const Eigen::Vector3d&) {
+    const double steps = random.uniform(0.0, 1.0) < 0.9 ? 63.0 : 64.0;
+    return (random.uniform(0.0, 1.0) < 0.5 ? -steps : steps) / 127.0 * config.truncation_m();
+  });
+  const Decoded decoded(tiles, config.truncation_m());
+  std::size_t triangles = 0, untorn = 0;
+  for (const auto& [key, tile] : tiles) {
+    triangles += extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded)).triangles.size();
+    untorn += extract_tile_mesh(key, 1e3, std::cref(decoded)).triangles.size();
+  }
+  EXPECT_LT(triangles, untorn);
+  EXPECT_GT(triangles, untorn / 2);
+  const Mesh whole = extract_mesh(tiles, config.voxel_size_m, config.truncation_m());
+  EXPECT_EQ(triangles, whole.triangles.size());
+}
+
 TEST(TileMesh, NormalsPointOutOfASphere) {
   const TsdfConfig config = coarse_config();
   const auto tiles = two_spheres(config);
@@ -119,7 +171,8 @@ TEST(TileMesh, NormalsPointOutOfASphere) {
   const auto voxel = static_cast<float>(config.voxel_size_m);
   int looked = 0;
   for (const auto& [key, tile] : tiles) {
-    for (const TileVertex& vertex : extract_tile_mesh(key, std::cref(decoded)).vertices) {
+    for (const TileVertex& vertex :
+         extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded)).vertices) {
       const Eigen::Vector3f p = voxel * (vertex.position_voxels +
                                          Eigen::Vector3f(16.0f * static_cast<float>(key.x) + 0.5f,
                                                          16.0f * static_cast<float>(key.y) + 0.5f,
@@ -135,7 +188,7 @@ TEST(TileMesh, NormalsPointOutOfASphere) {
 
 TEST(TileMesh, NothingOfATileThatIsNotThere) {
   EXPECT_TRUE(
-      extract_tile_mesh({1, 2, 3}, [](const TileKey&) { return nullptr; }).vertices.empty());
+      extract_tile_mesh({1, 2, 3}, 0.05, [](const TileKey&) { return nullptr; }).vertices.empty());
 }
 
 TEST(TileMesh, AChangedTileIsDrawnWithAllItsNeighbours) {
@@ -152,7 +205,7 @@ TEST(TileMesh, CoarserHasFewerTrianglesAtTheSamePlace) {
   const Decoded decoded(tiles, config.truncation_m());
   std::size_t fine = 0, coarse = 0;
   for (const auto& [key, tile] : tiles) {
-    const TileMesh mesh = extract_tile_mesh(key, std::cref(decoded));
+    const TileMesh mesh = extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded));
     const TileMesh few = coarsened(mesh, 4);
     fine += mesh.triangles.size();
     coarse += few.triangles.size();
@@ -169,6 +222,32 @@ TEST(TileMesh, CoarserHasFewerTrianglesAtTheSamePlace) {
   }
   EXPECT_GT(coarse, 0u);
   EXPECT_LT(4 * coarse, fine);
+}
+
+// A floor over four tiles: the coarser surface has no gap between them.
+TEST(TileMesh, CoarserSurfacesOfNeighboursMeet) {
+  const TsdfConfig config = coarse_config();
+  const auto tiles = tiles_of(config, [](const Eigen::Vector3d& p) { return p.z() - 0.123; });
+  const Decoded decoded(tiles, config.truncation_m());
+  double fine_area = 0.0, coarse_area = 0.0;
+  const auto area_voxels2 = [](const TileMesh& mesh) {
+    double area = 0.0;
+    for (const auto& t : mesh.triangles) {
+      const Eigen::Vector3f a = mesh.vertices[t[0]].position_voxels;
+      const Eigen::Vector3f ab = mesh.vertices[t[1]].position_voxels - a;
+      const Eigen::Vector3f ac = mesh.vertices[t[2]].position_voxels - a;
+      area += 0.5 * ab.cross(ac).norm();
+    }
+    return area;
+  };
+  for (const TileKey& key :
+       {TileKey{-1, -1, 0}, TileKey{0, -1, 0}, TileKey{-1, 0, 0}, TileKey{0, 0, 0}}) {
+    const TileMesh mesh = extract_tile_mesh(key, config.voxel_size_m, std::cref(decoded));
+    fine_area += area_voxels2(mesh);
+    coarse_area += area_voxels2(coarsened(mesh, 16));
+  }
+  EXPECT_NEAR(fine_area, 4 * 16 * 16, 0.1);
+  EXPECT_NEAR(coarse_area, fine_area, 0.1);
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ struct Page {
 TEST(SurfaceMaker, DrawsTilesAndChunksOnce) {
   SurfaceMaker maker;
   Page page;
-  maker.update(floor_of(5, 7.5), 1, config().truncation_m());
+  maker.update(floor_of(5, 7.5), 1, config().voxel_size_m, config().truncation_m());
   page.all(maker);
   EXPECT_EQ(page.tiles.size(), 25u);
   EXPECT_EQ(page.chunks.size(), 4u);
@@ -66,20 +66,20 @@ TEST(SurfaceMaker, DrawsTilesAndChunksOnce) {
     EXPECT_GT(chunk.vertices(), 0u);
     for (std::size_t v = 0; v < chunk.vertices(); ++v) EXPECT_EQ(chunk.earlier(v), 0);
   }
-  maker.update(floor_of(5, 7.5), 1, config().truncation_m());
+  maker.update(floor_of(5, 7.5), 1, config().voxel_size_m, config().truncation_m());
   EXPECT_TRUE(maker.idle());
 }
 
 TEST(SurfaceMaker, AChangeIsTheSameAsAllAnew) {
   SurfaceMaker step, anew;
   Page stepped, fresh;
-  step.update(floor_of(5, 7.5), 1, config().truncation_m());
+  step.update(floor_of(5, 7.5), 1, config().voxel_size_m, config().truncation_m());
   stepped.all(step);
   const int before = stepped.drawn;
   // One column of tiles goes: the neighbours' borders change with it.
-  step.update(floor_of(5, 7.5, 2), 1, config().truncation_m());
+  step.update(floor_of(5, 7.5, 2), 1, config().voxel_size_m, config().truncation_m());
   stepped.all(step);
-  anew.update(floor_of(5, 7.5, 2), 1, config().truncation_m());
+  anew.update(floor_of(5, 7.5, 2), 1, config().voxel_size_m, config().truncation_m());
   fresh.all(anew);
   EXPECT_LT(stepped.drawn - before, 25);
   ASSERT_EQ(stepped.tiles.size(), fresh.tiles.size());
@@ -90,9 +90,9 @@ TEST(SurfaceMaker, AChangeIsTheSameAsAllAnew) {
 TEST(SurfaceMaker, WhatANewRunHasNotSeenStaysAsEarlier) {
   SurfaceMaker maker;
   Page page;
-  maker.update(floor_of(3, 7.5), 1, config().truncation_m());
+  maker.update(floor_of(3, 7.5), 1, config().voxel_size_m, config().truncation_m());
   page.all(maker);
-  maker.update(floor_of(1, 7.5), 2, config().truncation_m());
+  maker.update(floor_of(1, 7.5), 2, config().voxel_size_m, config().truncation_m());
   page.all(maker);
   EXPECT_EQ(page.tiles.size(), 9u);
   EXPECT_EQ((page.tiles[{0, 0, 0}].run), 2u);
@@ -110,7 +110,7 @@ TEST(SurfaceMaker, CountsTilesThatAreNone) {
   Page page;
   auto tiles = floor_of(2, 7.5);
   tiles[{1, 1, 0}].payload = std::vector<std::uint8_t>{1, 2, 3};
-  maker.update(tiles, 1, config().truncation_m());
+  maker.update(tiles, 1, config().voxel_size_m, config().truncation_m());
   page.all(maker);
   EXPECT_EQ(maker.unreadable(), 1u);
   EXPECT_EQ(page.tiles.size(), 3u);

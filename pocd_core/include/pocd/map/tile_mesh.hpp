@@ -29,15 +29,17 @@ struct TileMesh {
 /// The triangles of extract_mesh() whose cell has its lowest corner in this tile: together the
 /// meshes of all tiles are the surface of the map, each triangle once. Cells reach into the seven
 /// upper neighbours; normals are central differences of the distances and look at all 26. Empty
-/// when the tile is not there. Thread-safe as far as `tile_of` is.
-TileMesh extract_tile_mesh(const TileKey& key, const TileLookup& tile_of);
+/// when the tile is not there. Like there, triangles across a tear of more than four voxels
+/// (`voxel_size_m`) are left out. Thread-safe as far as `tile_of` is.
+TileMesh extract_tile_mesh(const TileKey& key, double voxel_size_m, const TileLookup& tile_of);
 
 /// The tiles whose mesh may change when this one does, itself among them: it is their neighbour.
 std::vector<TileKey> tiles_drawn_with(const TileKey& key);
 
 /// Coarser by vertex clustering (Rossignac and Borrel 1993): vertices in one cube of `cell_voxels`
-/// become their mean, and triangles with two corners in one cube go. The owner is that of most of
-/// the vertices of a cube, of the lowest id where they are as many.
+/// become their mean, and triangles with two corners in one cube go. Vertices on the sides of the
+/// tile keep to them, so that the coarser surfaces of neighbours meet without a gap. The owner is
+/// that of most of the vertices of a cube, of the lowest id where they are as many.
 TileMesh coarsened(const TileMesh& mesh, int cell_voxels);
 
 }  // namespace pocd
