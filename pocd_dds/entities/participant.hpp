@@ -30,6 +30,8 @@ struct BusOptions {
   std::string user_data = "";
   /// Others forget this participant when they have not heard of it for so long [s].
   double lease_s = 5.0;
+  /// Discovery that stands still for so long hangs [s].
+  double stall_s = 10.0;
   /// Hears of everything that is discovered, from the first moment; must outlive the participant.
   eprosima::fastdds::dds::DomainParticipantListener* listener = nullptr;
 };
@@ -81,6 +83,14 @@ class Participant {
   void joined(const Guid& endpoint, const Endpoint& what);
   void left(const Guid& endpoint);
   std::map<Guid, Endpoint> endpoints() const;
+
+  /// For how long Fast DDS has not taken what came from the bus [s]. Never waits. Beyond
+  /// BusOptions::stall_s, which is logged once, its discovery is deadlocked: endpoints that are
+  /// made or deleted then wait for ever, as does the end of this participant.
+  double still_s() const;
+  bool hangs() const;
+  /// How often that has begun.
+  std::uint64_t stalls() const;
 
   eprosima::fastdds::dds::DomainParticipant* get() const;
   eprosima::fastdds::dds::Publisher* publisher() const;

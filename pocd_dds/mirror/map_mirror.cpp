@@ -32,6 +32,9 @@ using Clock = std::chrono::steady_clock;
 namespace msg = pocd_msgs::msg;
 
 constexpr std::chrono::milliseconds kIdle{50};
+/// Longer than Fast DDS takes for any message [s]: discovery may hang, and whoever makes or deletes
+/// an endpoint then hangs, too.
+constexpr double kReturns = 1.0;
 constexpr int kMost = 1000;  // samples of a topic in one turn, so that no peer holds up the others
 
 std::array<std::uint8_t, 16> random_id() {
@@ -171,6 +174,8 @@ void MapMirror::Impl::join_anew_if_deaf() {
   const auto now = Clock::now();
   const auto silence = publishers.silence(now);
   if (!rejoining.due(now, silence)) return;
+  // The end of the old one would never return.
+  if (bus->participant->still_s() > kReturns) return;
   dds::log_warning("{}: nothing was heard of the publisher for {} s: joins the bus anew",
                    options.name, std::chrono::duration_cast<std::chrono::seconds>(silence).count());
   // The new one before the old one goes, so that it gets other ports.
@@ -322,6 +327,7 @@ void MapMirror::Impl::catch_up() {
     reply_parts.keep(leads_on);
   }
   last_at = at;
+  if (bus->participant->still_s() > kReturns) return;
   const bool stale = manifest && !follower.current() && publishers.present();
   const bool hears = bus->replies && bus->replies->matched() > 0;
   const auto wish = plan.next(Clock::now(), {stale, bus->requests.matched() > 0, hears});
@@ -388,6 +394,9 @@ MirrorStatus MapMirror::Impl::status_now() const {
   if (status.stale_because.empty() && publishers.silence(now) >= dds::Publishers::kQuiet) {
     status.stale_because = "nothing was heard of the publisher for " +
                            std::to_string(dds::Publishers::kQuiet.count()) + " s";
+  }
+  if (bus->participant->hangs()) {
+    status.stale_because = "Fast DDS's discovery hangs: start this process anew";
   }
   if (!rivals.empty()) status.stale_because = conflict(options.map_id, status.epoch, rivals);
   status.in_step = status.stale_because.empty();

@@ -197,6 +197,7 @@ ObjectWatch::ObjectWatch(const ObjectWatchOptions& options)
 ObjectWatch::~ObjectWatch() = default;
 
 bool ObjectWatch::publisher_present() const {
+  if (impl_->participant->hangs()) return false;
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   return std::any_of(impl_->publishers.begin(), impl_->publishers.end(),
                      [&](const auto& entry) { return impl_->manifests.has_writer(entry.first); });
@@ -208,6 +209,7 @@ WatchStatus ObjectWatch::status() const {
     const std::lock_guard<std::mutex> lock(impl_->mutex);
     status = impl_->counts;
   }
+  if (impl_->participant->hangs()) status.hangs = "Fast DDS's discovery hangs";
   status.callbacks = impl_->callbacks.status();
   status.failures = impl_->thread.failures();
   status.last_failure = impl_->thread.last_failure();

@@ -85,6 +85,7 @@ std::vector<Figure> figures_of(const NodeReport& report) {
   list.yes_no("ready", "ready", report.state.ready);
   list.tenths("longest time without a turn of a thread [s]", "thread_still_seconds",
               report.state.still_s);
+  list.count("times that discovery hung", "discovery_stalls_total", report.state.discovery_stalls);
   list.count("samples not written", "samples_not_written_total", work.write_failures);
   list.count("frames received", "frames_received_total", frames.received);
   list.count("frames processed", "frames_processed_total", work.processed);

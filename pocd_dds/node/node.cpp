@@ -38,6 +38,7 @@ double seconds(Clock::duration time) { return std::chrono::duration<double>(time
 BusOptions watched(BusOptions bus, const NodeConfig& node, BusWatch& watch) {
   bus.listener = &watch;
   bus.user_data = RosGraph::user_data(node.outputs);
+  bus.stall_s = node.stall_s;
   return bus;
 }
 
@@ -341,8 +342,13 @@ NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
   look("the pipeline", worker_pulse.still_s(), worked);
   look("the intake", intake->still_s(), ending);
   look("the writer of objects", teller_pulse.still_s(), told);
-  NodeState state{word, false, signs.still_s, health.judge(signs, Clock::now())};
+  look("Fast DDS's discovery", participant->still_s(), false);
+  NodeState state;
+  state.word = word;
+  state.still_s = signs.still_s;
+  state.verdict = health.judge(signs, Clock::now());
   state.ready = !ending && signs.still_s < config.node.stall_s;
+  state.discovery_stalls = participant->stalls();
   return state;
 }
 

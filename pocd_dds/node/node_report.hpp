@@ -27,7 +27,8 @@ struct MapTraffic {
 struct NodeState {
   std::string word = "running";  ///< or "stopped"
   bool ready = false;
-  double still_s = 0.0;  ///< of the slowest thread
+  double still_s = 0.0;                ///< of the slowest thread, or of Fast DDS
+  std::uint64_t discovery_stalls = 0;  ///< times that Fast DDS's discovery hung
   HealthVerdict verdict;
 };
 

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "full_writers.hpp"
+#include "hung_discovery.hpp"
 #include "robot_sender.hpp"
 
 namespace pocd {
@@ -215,6 +216,80 @@ TEST(Health, SystemdHearsThatItIsReadyAndAlive) {
   said = notices.take();
   EXPECT_NE(said.find("STOPPING=1"), std::string::npos) << said;
   EXPECT_EQ(count_of(said, "READY=1"), 0u) << "once";
+}
+
+// Fast DDS 2.9.1 can deadlock its discovery for good. Nobody noticed: the node processed nothing.
+TEST(Health, DiscoveryThatHangsIsSaidAndWhatIsSaidRecovers) {
+  if (sanitized()) GTEST_SKIP() << "a sanitizer has to be loaded first";
+  NoticeSocket notices;
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto hang = folder.path() / "hang", socket = folder.path() / "health";
+  HealthWatch health(test_participant(domain));
+  Process node(with_hung_discovery(hang, quick_command(domain, {"--health-socket", socket})));
+  const auto ask = [&] {
+    return run_command({bin("pocd_health"), "--ready", "--timeout", "1", "--socket", socket,
+                        "--domain", domain.text()});
+  };
+  const auto says = [](const CommandResult& word) {
+    return word.out.find("Fast DDS's discovery has not ended a turn for ") != std::string::npos;
+  };
+  ASSERT_TRUE(eventually([&] { return health.newest() && ask().exit_code == 0; }));
+  std::ofstream(hang) << '\n';
+  CommandResult word;
+  EXPECT_TRUE(eventually([&] { return says(word = ask()); })) << word.out << node.err();
+  EXPECT_EQ(word.exit_code, 1) << word.out;
+  std::string said;
+  notices.take();
+  EXPECT_TRUE(eventually([&] {
+    said += notices.take();
+    return count_of(said, "STATUS=Fast DDS's discovery has not ended a turn") >= 3;
+  })) << said;
+  EXPECT_EQ(count_of(said, "WATCHDOG=1"), 0u) << said;
+  EXPECT_TRUE(node.running());
+  EXPECT_TRUE(
+      eventually([&] { return node.err().find("start this process anew") != std::string::npos; }));
+
+  std::filesystem::remove(hang);
+  EXPECT_TRUE(eventually([&] { return ask().exit_code == 0; })) << ask().out;
+  EXPECT_TRUE(eventually([&] { return node.err().find("goes on after") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] { return health.newest()->level() == 0 && health.newest()->ready(); }))
+      << "who had lost it has found it again";
+  EXPECT_TRUE(eventually([&] { return notices.take().find("WATCHDOG=1") != std::string::npos; }));
+  EXPECT_EQ(count_of(node.err(), "Fast DDS's discovery"), 2u) << node.err();
+  node.signal(SIGTERM);
+  EXPECT_EQ(node.wait().exit_code, 0);
+}
+
+// A fleet manager has to hear it from its copy.
+TEST(Health, ACopyInWhichDiscoveryHangsIsNotInStep) {
+  if (sanitized()) GTEST_SKIP() << "a sanitizer has to be loaded first";
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto hang = folder.path() / "hang";
+  Process node(quick_command(domain));
+  Process mirror(with_hung_discovery(hang, {bin("pocd_mirror"), "--domain", domain.text()}));
+  const auto says = [&](const std::string& text) {
+    return eventually([&] { return mirror.err().find(text) != std::string::npos; });
+  };
+  ASSERT_TRUE(says("in step with publisher")) << mirror.err();
+  std::ofstream(hang) << '\n';
+  EXPECT_TRUE(says("Fast DDS's discovery has not ended a turn for 1")) << mirror.err();
+  EXPECT_TRUE(says("stale, because Fast DDS's discovery hangs: start this process anew"))
+      << mirror.err();
+  // A copy that hears nothing joins anew; the end of the participant that hangs would not return.
+  const auto hung = std::chrono::steady_clock::now();
+  EXPECT_TRUE(eventually(
+      [&] { return std::chrono::steady_clock::now() - hung > std::chrono::seconds(15); }));
+  EXPECT_EQ(count_of(mirror.err(), "joins the bus anew"), 0u) << mirror.err();
+  EXPECT_TRUE(mirror.running());
+  std::filesystem::remove(hang);
+  EXPECT_TRUE(eventually([&] { return count_of(mirror.err(), "in step with publisher") >= 2; }))
+      << mirror.err();
+  mirror.signal(SIGTERM);
+  EXPECT_EQ(mirror.wait().exit_code, 0);
+  node.signal(SIGTERM);
+  EXPECT_EQ(node.wait().exit_code, 0);
 }
 
 }  // namespace

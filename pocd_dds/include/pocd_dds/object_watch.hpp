@@ -62,7 +62,9 @@ struct WatchStatus {
   std::size_t objects = 0;     ///< known now
   std::uint64_t too_many = 0;  ///< samples of objects beyond `most_objects`
   std::uint64_t corrupt = 0;   ///< samples that could not be read
-  std::string refused;         ///< whose samples are not read, being of another version of the type
+  /// Not empty: nothing is heard any more until this process is started anew, and why.
+  std::string hangs;
+  std::string refused;  ///< whose samples are not read, being of another version of the type
   CallbackStatus callbacks;
   std::uint64_t failures = 0;  ///< turns of the watch's thread that have failed; it goes on
   std::string last_failure;
