@@ -4,8 +4,6 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
-#include <pthread.h>
-#include <chrono>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -15,17 +13,15 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
-#include <thread>
 #include <typeindex>
 
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/bus_log.hpp"
+#include "pocd_dds/entities/discovery_watch.hpp"
 #include "pocd_dds/entities/idl_version.hpp"
 #include "pocd_dds/entities/shared_memory.hpp"
 #include "pocd_dds/entities/socket_buffers.hpp"
-#include "pocd_dds/entities/stall_note.hpp"
 #include "pocd_dds/entities/type_watch.hpp"
-#include "pocd_dds/entities/wakeup.hpp"
 #include "pocd_dds/entities/watched_transport.hpp"
 
 namespace pocd::dds {
@@ -47,8 +43,6 @@ constexpr double kSignsOfLife = 5.0;
 // and makes one that hears nobody when they are taken.
 constexpr std::uint32_t kLastOfAHost = 119;
 constexpr int kLastDomain = 232;  // RTPS 2.2, 9.6.1.1: beyond it the port numbers overflow
-
-constexpr std::chrono::seconds kLook{1};
 
 // The name has to outlive every participant.
 constexpr const char* kBackground = "pocd_background";
@@ -203,17 +197,10 @@ int default_domain() {
 
 struct Participant::Impl {
   explicit Impl(const BusOptions& options)
-      : watch(options.listener),
-        stall_s(options.stall_s),
-        note(options.name + ": Fast DDS's discovery",
-             "nobody is found or heard any more; start this process anew (docs/operating.md, "
-             "Fast-DDS #6502)",
-             options.stall_s) {}
+      : watch(options.listener), discovery(options.name, options.stall_s) {}
 
   TypeWatch watch;
-  const double stall_s;
-  const std::shared_ptr<OpenCalls> calls = std::make_shared<OpenCalls>();
-  StallNote note;
+  DiscoveryWatch discovery;
   DomainParticipant* participant = nullptr;
   Publisher* publisher = nullptr;
   Subscriber* subscriber = nullptr;
@@ -251,24 +238,7 @@ struct Participant::Impl {
     if (participant->delete_topic(used.topic) == ReturnCode_t::RETCODE_OK) topics.erase(name);
   }
 
-  /// By a thread of its own, as whoever uses the participant may hang with it.
-  void look_after() {
-    pthread_setname_np(pthread_self(), "pocd_watch");
-    while (!ending) {
-      wakeup.wait_for(kLook);
-      const auto word = note.look(calls->longest_s());
-      if (word) log(word->hangs ? LogLevel::kError : LogLevel::kWarning, word->text);
-    }
-  }
-  Wakeup wakeup;
-  std::atomic<bool> ending{false};
-  std::thread watcher;
-
   ~Impl() {
-    // Also while it hangs, as its end will then.
-    ending = true;
-    wakeup.wake();
-    if (watcher.joinable()) watcher.join();
     if (participant == nullptr) return;
     participant->delete_contained_entities();
     DomainParticipantFactory::get_instance()->delete_participant(participant);
@@ -300,7 +270,7 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
     warn_of_profile(qos);
   }
   make_shared_memory_last(qos);
-  watch_transports(qos, impl_->calls);
+  watch_transports(qos, impl_->discovery.calls());
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   if (discovery.leaseDuration ==
       DomainParticipantQos().wire_protocol().builtin.discovery_config.leaseDuration) {
@@ -335,7 +305,6 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   impl_->publisher = impl_->participant->create_publisher(PUBLISHER_QOS_DEFAULT);
   impl_->subscriber = impl_->participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
   POCD_CHECK(impl_->publisher != nullptr && impl_->subscriber != nullptr);
-  impl_->watcher = std::thread([impl = impl_.get()] { impl->look_after(); });
 }
 
 Participant::~Participant() = default;
@@ -408,9 +377,9 @@ DataReaderQos Participant::reader_qos(const std::string& topic, const Delivery& 
   return qos;
 }
 
-double Participant::still_s() const { return impl_->calls->longest_s(); }
-bool Participant::hangs() const { return still_s() >= impl_->stall_s; }
-std::uint64_t Participant::stalls() const { return impl_->note.stalls(); }
+double Participant::still_s() const { return impl_->discovery.still_s(); }
+bool Participant::hangs() const { return impl_->discovery.hangs(); }
+std::uint64_t Participant::stalls() const { return impl_->discovery.stalls(); }
 
 DomainParticipant* Participant::get() const { return impl_->participant; }
 Publisher* Participant::publisher() const { return impl_->publisher; }
