@@ -146,6 +146,28 @@ TEST(Found, WhatGrewOntoAKnownThingIsASideOfIt) {
   EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
 }
 
+// A post hides what is between them, and one visit showed the left one, another the right one.
+TEST(Found, ThingsWhoseFacesAreInOnePlaneAreNoSidesOfOneThing) {
+  const Eigen::Vector3d size(0.8, 0.4, 1.3);
+  const auto screen = [](double x, double width) {
+    return solid(kCageClass, {x, 1.6}, {width, 0.1, 1.6});
+  };
+  const SceneObject left = solid(kBoxClass, {-0.5, 2.3}, size);
+  const SceneObject right = solid(kBoxClass, {0.5, 2.3}, size);
+  TrackerRig rig;
+  const auto visit = [&](const SceneObject& before, int looks) {
+    const Scene scene = room_with({left, right, before});
+    rig.look(scene, {}, 60.0);
+    rig.look_times(looks, scene);
+  };
+  visit(screen(0.42, 1.0), 10);
+  visit(screen(-0.42, 1.0), 10);
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
+  // On each visit it is asked once which of the known things are one.
+  visit(screen(0.0, 0.24), 3);
+  EXPECT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
+}
+
 // Of what left, a screen hid nearly the half: what came is larger than what was known.
 TEST(Found, AThingOfWhichOnlyAPartWasKnownMovesAsAWhole) {
   const Eigen::Vector3d size(0.9, 0.3, 0.7);
