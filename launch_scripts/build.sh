@@ -50,7 +50,9 @@ jobs=$(nproc)
 
 # MAKEFLAGS keeps colcon from adding a limit by load average, which on a busy machine means one job.
 export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs MAKEFLAGS="-j$jobs"
-if ! colcon --log-level error build --merge-install --executor sequential "${base[@]}" "${selection[@]}" \
+# Only here: what a program leaves in output/, as npm does, may look like a package, too.
+if ! colcon --log-level error build --base-paths pocd_core pocd_msgs pocd_dds test \
+  --merge-install --executor sequential "${base[@]}" "${selection[@]}" \
   --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "${sanitizer[@]}" "$@"; then
   # Ninja reports compiler errors on stdout, which colcon keeps in a file.
   failed=$(ls -t log/latest_build/*/stdout_stderr.log 2>/dev/null | head -n 1)

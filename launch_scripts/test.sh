@@ -54,7 +54,7 @@ launch_scripts/build.sh "${build_arguments[@]}"
 results=$build/pocd_test
 rm -rf "$results/gtest" "$results/Testing"
 status=0
-colcon --log-level error test --merge-install "${base[@]}" --packages-select pocd_test \
+colcon --log-level error test --base-paths test --merge-install "${base[@]}" --packages-select pocd_test \
   --event-handlers console_direct+ --return-code-on-test-failure \
   --ctest-args --output-on-failure --parallel "$(nproc)" "${ctest_arguments[@]}" || status=$?
 

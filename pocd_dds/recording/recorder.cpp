@@ -190,7 +190,7 @@ struct Recorder::Impl {
     std::string topic;
     RerunForm form;
     std::optional<std::uint16_t> channel;  // of a second topic
-    std::size_t told = 0;                  // kinds of what is left out
+    std::set<std::string> told;            // of what is left out
   };
   std::map<std::uint16_t, Converted> converted;  // by channel; guarded as the writer is
   std::exception_ptr failure;
@@ -275,7 +275,7 @@ void Recorder::Impl::add_rerun_form(const RecordedTopic& topic, std::uint16_t ch
         {{kMadeOf, recorded_name(topic.name)}, {"partitions", metadata.at("partitions")}});
   }
   const std::lock_guard<std::mutex> lock(writer_mutex);
-  converted.emplace(channel, Converted{recorded_name(topic.name), std::move(*form), second});
+  converted.emplace(channel, Converted{recorded_name(topic.name), std::move(*form), second, {}});
 }
 
 /// Changes the sample, or writes another one beside it.
@@ -283,13 +283,9 @@ void Recorder::Impl::write_for_rerun(QueuedSample& sample) {
   const auto found = converted.find(sample.header.channel);
   if (found == converted.end()) return;
   std::optional<recording::Bytes> made = found->second.form.convert(sample.payload);
-  const auto& left_out = found->second.form.left_out();
-  if (left_out.size() > found->second.told) {
-    found->second.told = left_out.size();
-    for (const auto& [what, count] : left_out) {
-      spdlog::warn("{}: Rerun will not show {} (the recording has them)", found->second.topic,
-                   what);
-    }
+  for (const auto& [what, count] : found->second.form.left_out()) {
+    if (!found->second.told.insert(what).second) continue;
+    spdlog::warn("{}: Rerun will not show {} (the recording has them)", found->second.topic, what);
   }
   if (!made) return;
   if (!found->second.channel) {

@@ -152,6 +152,11 @@ void ObjectTracker::join_objects(Step& step) {
   }
 }
 
+void ObjectTracker::join(Step& step, LibraryObject& a, LibraryObject& b) {
+  const bool older = a.id < b.id;
+  absorb(step, older ? a : b, older ? b : a);
+}
+
 void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed) {
   const ObjectId absorbed_id = absorbed.id;
   const bool was_known = absorbed.confirmed;

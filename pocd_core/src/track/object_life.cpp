@@ -57,8 +57,7 @@ void ObjectTracker::report_changes(Step& step) {
     if (object->added_ns && find_origin(step, *object)) continue;
     // Or a side of what stands there.
     if (LibraryObject* whole = grown_onto(step, *object)) {
-      const bool older = whole->id < id;
-      absorb(step, older ? *whole : *object, older ? *object : *whole);
+      join(step, *object, *whole);
       continue;
     }
     add_event(step, EventKind::kUpdated, *object,

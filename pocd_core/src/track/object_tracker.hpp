@@ -88,6 +88,8 @@ class ObjectTracker {
   void hide_space_behind(Step& step, const LibraryObject& object, std::size_t from);
   void refit_box(Step& step, LibraryObject& object);
   void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
+  /// Makes one of two known objects; the older one goes on.
+  void join(Step& step, LibraryObject& a, LibraryObject& b);
   /// Whether what is known of two objects allows that they are one.
   bool may_be_one(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether each of two objects lies before the other one, as the walls of a corner do seen from

@@ -127,8 +127,7 @@ void ObjectTracker::join_sides(Step& step) {
             !may_be_one(*object, *other) || !sides_of_one(step, *object, *other)) {
           continue;
         }
-        const bool older = object->id < other->id;
-        absorb(step, older ? *object : *other, older ? *other : *object);
+        join(step, *object, *other);
         joined = true;
         break;
       }
