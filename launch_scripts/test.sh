@@ -56,7 +56,7 @@ rm -rf "$results/gtest" "$results/Testing"
 status=0
 colcon --log-level error test --base-paths test --merge-install "${base[@]}" --packages-select pocd_test \
   --event-handlers console_direct+ --return-code-on-test-failure \
-  --ctest-args --output-on-failure --parallel "$(nproc)" "${ctest_arguments[@]}" || status=$?
+  --ctest-args --output-on-failure "${ctest_arguments[@]}" || status=$?
 
 passed=0 failed=0 skipped=0
 attribute() { sed -n "s/.*<testsuites .*\b$1=\"\([0-9]*\)\".*/\1/p" "$2"; }
