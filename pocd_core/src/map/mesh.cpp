@@ -76,20 +76,18 @@ void make_vertices(MapReader& map, const BlockKey& key, double voxel_m, int min_
 
 // Calls triangle(i, j, k) with (block offset 0..7, code) pairs packed as 2048 * offset + code.
 template <class Triangle>
-void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight, float torn_tsdf,
+void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight, float per_voxel,
                        const Triangle& triangle) {
   PaddedBlock block;
   fill(map, key, min_weight, block);
   for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
     const int x = v & 7, y = v >> 3 & 7, z = v >> 6;
+    if (!block.valid[padded_index(x, y, z)]) continue;
     std::array<float, 8> tsdf;
-    bool complete = true;
     for (int c = 0; c < 8; ++c) {
       const int i = padded_index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
-      complete &= block.valid[i];
-      tsdf[c] = block.tsdf[i];
+      tsdf[c] = block.valid[i] ? block.tsdf[i] : kUnknownDistance;
     }
-    if (!complete) continue;
     const auto locate = [&](int edge) {
       const int low = kCellEdges[edge].low;
       const int ex = x + (low & 1), ey = y + (low >> 1 & 1), ez = z + (low >> 2);
@@ -98,7 +96,7 @@ void for_each_triangle(MapReader& map, const BlockKey& key, int min_weight, floa
              kCellEdges[edge].axis;
     };
     pocd::for_each_triangle(
-        tsdf, torn_tsdf, [&](int i, int j, int k) { triangle(locate(i), locate(j), locate(k)); });
+        tsdf, per_voxel, [&](int i, int j, int k) { triangle(locate(i), locate(j), locate(k)); });
   }
 }
 
@@ -134,8 +132,7 @@ Mesh compact(const std::vector<BlockMesh>& parts, const std::vector<std::uint32_
 Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool) {
   const int threshold = std::max(min_weight, 1);
   const double voxel_m = map.config().voxel_size_m;
-  const float torn_tsdf =
-      torn_beyond(kTsdfScale / static_cast<float>(map.config().truncation_voxels));
+  const float per_voxel = kTsdfScale / static_cast<float>(map.config().truncation_voxels);
   // Region by region, so that none has to be read from disk often.
   const std::vector<BlockKey> keys = map.keys_by_region();
   const auto before = [](const BlockKey& a, const BlockKey& b) {
@@ -166,7 +163,7 @@ Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool) {
         const auto at = std::lower_bound(codes.begin(), codes.end(), packed & 2047);
         return first[block] + static_cast<std::uint32_t>(at - codes.begin());
       };
-      for_each_triangle(reader, keys[b], threshold, torn_tsdf, [&](int i, int j, int k) {
+      for_each_triangle(reader, keys[b], threshold, per_voxel, [&](int i, int j, int k) {
         parts[b].triangles.push_back({vertex(i), vertex(j), vertex(k)});
       });
     }

@@ -64,20 +64,20 @@ Eigen::Vector3f gradient(const PaddedTile& tile, int at) {
 
 class Mesher {
  public:
-  Mesher(const PaddedTile& tile, float torn_m, TileMesh& mesh)
+  Mesher(const PaddedTile& tile, float voxel_m, TileMesh& mesh)
       : tile_(tile),
-        torn_m_(torn_m),
+        voxel_m_(voxel_m),
         mesh_(mesh),
         vertex_of_(3 * kCorners * kCorners * kCorners, kNoVertex) {}
 
   void cell(int x, int y, int z) {
+    if (tile_.observed[padded(x, y, z)] == 0) return;
     std::array<float, 8> distance;
     for (int c = 0; c < 8; ++c) {
       const int at = padded(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2));
-      if (tile_.observed[at] == 0) return;
-      distance[c] = tile_.distance[at];
+      distance[c] = tile_.observed[at] != 0 ? tile_.distance[at] : kUnknownDistance;
     }
-    for_each_triangle(distance, torn_m_, [&](int i, int j, int k) {
+    for_each_triangle(distance, voxel_m_, [&](int i, int j, int k) {
       mesh_.triangles.push_back({vertex(x, y, z, i), vertex(x, y, z, j), vertex(x, y, z, k)});
     });
   }
@@ -106,7 +106,7 @@ class Mesher {
   }
 
   const PaddedTile& tile_;
-  const float torn_m_;
+  const float voxel_m_;
   TileMesh& mesh_;
   std::vector<std::uint32_t> vertex_of_;
 };
@@ -132,7 +132,7 @@ TileMesh extract_tile_mesh(const TileKey& key, double voxel_size_m, const TileLo
     const DecodedTile* decoded = tile_of(neighbour);
     if (decoded != nullptr) copy_from(*decoded, dx, dy, dz, tile);
   });
-  Mesher mesher(tile, torn_beyond(static_cast<float>(voxel_size_m)), mesh);
+  Mesher mesher(tile, static_cast<float>(voxel_size_m), mesh);
   for (int z = 0; z < kTileSide; ++z) {
     for (int y = 0; y < kTileSide; ++y) {
       for (int x = 0; x < kTileSide; ++x) mesher.cell(x, y, z);

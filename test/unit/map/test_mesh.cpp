@@ -93,8 +93,9 @@ TEST(Mesh, RandomDistancesGiveAClosedSurface) {
   expect_closed(mesh);
 }
 
-// The band that a silhouette leaves behind it ends in free space that was seen from the side: its end
-// is no surface. Here the front of a thing, at x = 0, is known three voxels deep, over half of it.
+// The band that a silhouette leaves behind it ends in free space that was seen from the side: its
+// end is no surface. Here the front of a thing, at x = 0, is known three voxels deep, over half of
+// it.
 TEST(Mesh, TheEndOfABandInFreeSpaceIsNoSurface) {
   ThreadPool pool(1);
   const auto is_band = [](const Eigen::Vector3d& p) { return std::abs(p.y()) < 0.2; };
@@ -114,7 +115,22 @@ TEST(Mesh, TheEndOfABandInFreeSpaceIsNoSurface) {
   }
 }
 
-TEST(Mesh, OnlyCellsWithAllEightVoxelsObservedCount) {
+// Along rays that meet a plane at 12 degrees the distance grows by more than four voxels from voxel
+// to voxel, as across a tear; but just behind the plane it is small.
+TEST(Mesh, ASurfaceSeenAtASmallAngleIsNoTear) {
+  ThreadPool pool(1);
+  const auto triangles = [&](double plane_m) {
+    return extract_mesh(
+               map_of([&](const Eigen::Vector3d& p) { return 4.6 * (p.z() - plane_m); }, 8), 5,
+               pool)
+        .triangles.size();
+  };
+  EXPECT_EQ(triangles(-0.02), 15u * 15u * 2u) << "inside by 2.3 cm";
+  EXPECT_EQ(triangles(0.005), 0u) << "inside by 14 cm: it may as well be the end of a band";
+}
+
+// A plane between the voxels z = 0 and z = 1, of which some were never observed.
+TEST(Mesh, SurfaceShowsUpToWhereNothingWasObserved) {
   ThreadPool pool(1);
   TsdfMap map = map_of([](const Eigen::Vector3d& p) { return p.z() - 0.03; }, 8);
   const Mesh whole = extract_mesh(map, 5, pool);
@@ -123,8 +139,19 @@ TEST(Mesh, OnlyCellsWithAllEightVoxelsObservedCount) {
   EXPECT_TRUE(extract_mesh(map, 6, pool).triangles.empty());
   map.touch({0, 0, 0}).weight[0] = 0;  // voxel (0, 0, 0), just below the plane
   const Mesh holed = extract_mesh(map, 5, pool);
-  EXPECT_EQ(holed.triangles.size(), 15u * 15u * 2u - 8u);
+  // Of the four cells around it, those triangles go that had the vertex above it, and the cell of
+  // which it is the lowest voxel.
+  EXPECT_LT(holed.triangles.size(), whole.triangles.size());
+  EXPECT_GT(holed.triangles.size(), 15u * 15u * 2u - 8u);
   EXPECT_EQ(holed.vertices_W.size(), 16u * 16u - 1u);  // no vertex is left without a triangle
+  // A strip that is one voxel wide, as between two things that stand before it.
+  for (int y = -8; y < 8; ++y) {
+    for (int x = -8; x < 8; ++x) {
+      if (x == 2 || x == 3) continue;
+      map.touch({x >> 3, y >> 3, 0}).weight[(x & 7) + 8 * (y & 7)] = 0;
+    }
+  }
+  EXPECT_EQ(extract_mesh(map, 5, pool).triangles.size(), 15u * 2u);
 }
 
 TEST(Mesh, OwnersFollowTheVoxels) {

@@ -16,9 +16,10 @@ struct Mesh {
   std::vector<std::uint32_t> owner;
 };
 
-/// Lorensen and Cline 1987 over every cell whose 8 voxels have weight >= min_weight; vertices
-/// shared between cells are merged, order is that of TsdfMap::keys_by_region, so equal maps give
-/// equal meshes.
+/// Lorensen and Cline 1987 over every cell whose lowest voxel was observed, with weight >=
+/// min_weight; of the others, those at the ends of a triangle's cut edges must be: surface shows up
+/// to where nothing was seen. Vertices shared between cells are merged, order is that of
+/// TsdfMap::keys_by_region, so equal maps give equal meshes.
 Mesh extract_mesh(const TsdfMap& map, int min_weight, ThreadPool& pool);
 
 /// The same from a copy of the published tiles (what a subscriber holds).
