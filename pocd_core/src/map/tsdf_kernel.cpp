@@ -97,10 +97,9 @@ POCD_KERNEL bool average(float truncation, float voxel, float max_weight, float 
     const std::int32_t w_old = weight[i];
     const std::int32_t contradicts =
         (s >= truncation ? kContradicted : 0) & (w_old > 0 ? -1 : 0) & (t_old < kFreeTsdf ? -1 : 0);
-    const std::int32_t stays_free = (s < behind ? 1 : 0) & (t_old >= kFreeTsdf ? 1 : 0) &
-                                    (w_old >= kKnownFreeWeight ? 1 : 0);
-    const std::int32_t apply =
-        (s >= -truncation ? -1 : 0) & ((contradicts | stays_free) ? 0 : -1);
+    const std::int32_t stays_free =
+        (s < behind ? 1 : 0) & (t_old >= kFreeTsdf ? 1 : 0) & (w_old >= kKnownFreeWeight ? 1 : 0);
+    const std::int32_t apply = (s >= -truncation ? -1 : 0) & ((contradicts | stays_free) ? 0 : -1);
     const float t = static_cast<float>(t_old);
     const float target = (s < truncation ? s : truncation) * scale;
     // What was inside lies well in front of a surface now, or the reverse.
@@ -247,8 +246,8 @@ BlockOutcome integrate_block(const KernelFrame& frame, float x, float y, float z
   }
   fetch(block.owner.data(), sizeof block.owner);
   const float free_weight = std::min(frame.max_weight, static_cast<float>(kFreeWeight));
-  const bool contradicted = average(frame.truncation, frame.voxel, frame.max_weight, free_weight, distance,
-                                    block.tsdf.data(), block.weight.data(), state);
+  const bool contradicted = average(frame.truncation, frame.voxel, frame.max_weight, free_weight,
+                                    distance, block.tsdf.data(), block.weight.data(), state);
   outcome.changed = (state[kVoxels] & kChanged) != 0;
   outcome.has_surface = (state[kVoxels] & kSurface) != 0;
   outcome.changed |= own(frame.owner_band, distance, state, owner, block.owner.data(),

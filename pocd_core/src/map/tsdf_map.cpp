@@ -168,7 +168,8 @@ const VoxelBlock* TsdfMap::find(const BlockKey& key) const {
   return nullptr;
 }
 
-std::optional<double> TsdfMap::distance_at(const Eigen::Vector3f& point_W, int min_weight) {
+std::optional<double> TsdfMap::distance_at(const Eigen::Vector3f& point_W, int min_weight,
+                                           const MapEdits& pending) {
   const TsdfConfig& config = impl_->config;
   const Eigen::Array3i voxel =
       (point_W.array() / static_cast<float>(config.voxel_size_m)).floor().cast<int>();
@@ -182,6 +183,10 @@ std::optional<double> TsdfMap::distance_at(const Eigen::Vector3f& point_W, int m
   const int i = (voxel.x() & 7) + 8 * ((voxel.y() & 7) + 8 * (voxel.z() & 7));
   const VoxelBlock& block = impl_->store.block(slot);
   if (block.weight[i] < min_weight) return std::nullopt;
+  if (!pending.empty()) {
+    const Eigen::Vector3d center_W = (voxel.cast<double>() + 0.5) * config.voxel_size_m;
+    if (pending.clears(ObjectId{block.owner[i]}, center_W)) return std::nullopt;
+  }
   return block.tsdf[i] / static_cast<double>(kTsdfScale) * config.truncation_m();
 }
 

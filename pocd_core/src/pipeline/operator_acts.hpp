@@ -3,6 +3,7 @@
 
 #include "../track/object_tracker.hpp"
 #include "ignored_regions.hpp"
+#include "pocd/map/tsdf_map.hpp"
 #include "pocd/pipeline/operator_word.hpp"
 #include "robot_notes.hpp"
 

@@ -89,7 +89,9 @@ std::size_t forget_objects(const std::function<bool(const Eigen::Vector2d&)>& in
   for (const auto& [id, object] : parts.tracker.library().all()) {
     if (inside(object->box.pose.position_W.head<2>())) ids.push_back(id);
   }
-  for (const ObjectId id : ids) parts.tracker.forget(id, said, parts.map, result);
+  MapEdits edits;
+  for (const ObjectId id : ids) parts.tracker.forget(id, said, edits, result);
+  edits.apply_to(parts.map);
   return result.retired.size();
 }
 
@@ -135,13 +137,14 @@ WordOutcome follow(const OperatorWord& word, const WordParts& parts) {
   const std::string rule = to_string(word.kind);
   const ObjectTracker::Said said{word.by, rule, parts.stamp_ns};
   FrameResult& result = outcome.result;
+  MapEdits edits;
   OrientedBox where = bounds_of(has_polygon(word.kind) ? word.polygon_W : Polygon());
   if (has_object(word.kind)) where = parts.tracker.library().find(word.object)->box;
   std::string noted = rule;
   try {
     switch (word.kind) {
       case WordKind::kForgetObject:
-        parts.tracker.forget(word.object, said, parts.map, result);
+        parts.tracker.forget(word.object, said, edits, result);
         outcome.text = "1 object forgotten";
         break;
       case WordKind::kForgetRegion:
@@ -161,7 +164,7 @@ WordOutcome follow(const OperatorWord& word, const WordParts& parts) {
         outcome.text = counted(parts.ignored.size(), "region") + " ignored";
         break;
       case WordKind::kConfirmRemoval:
-        parts.tracker.confirm_removal(word.object, said, parts.map, result);
+        parts.tracker.confirm_removal(word.object, said, edits, result);
         outcome.text = "1 object removed";
         break;
       case WordKind::kSave:
@@ -172,6 +175,7 @@ WordOutcome follow(const OperatorWord& word, const WordParts& parts) {
     outcome.text = rule + ": " + error.what();
     return outcome;
   }
+  edits.apply_to(parts.map);
   parts.tracker.note({word.by, noted, parts.stamp_ns}, where, result);
   std::sort(result.retired.begin(), result.retired.end());
   outcome.done = true;

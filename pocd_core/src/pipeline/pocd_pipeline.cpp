@@ -175,9 +175,14 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   clock.done("cluster");
   p.looked_at.note(p.cloud, frame.stamp_ns);
   p.field.update(p.cloud);
-  p.tracker.update(frame, p.cloud, p.field, p.observations, ground, p.map, p.owner_of_pixel,
-                   result);
+  MapEdits edits;
+  const auto distance_at = [&](const Eigen::Vector3f& point_W) {
+    return p.map.distance_at(point_W, FreeSpace::kLooks, edits);
+  };
+  p.tracker.update(frame, p.cloud, p.field, p.observations, ground, distance_at, edits,
+                   p.owner_of_pixel, result);
   clock.done("objects");
+  edits.apply_to(p.map);
   p.integrate(placed);
   if (const auto problem = p.map.take_problem()) result.warnings.push_back(*problem);
   clock.done("map");

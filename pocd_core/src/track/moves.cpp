@@ -291,16 +291,17 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   const ObjectId old = found.id;
   departures_.forget(from.id);
   if (absorbed) step.result.retired.push_back(*absorbed);
-  step.map.reassign_object(old, from.id);
+  step.edits.reassign(old, from.id);
   std::replace(step.owners.begin(), step.owners.end(), old, from.id);
   library_.rename(old, from.id);
   auto& retired = step.result.retired;
   retired.erase(std::remove(retired.begin(), retired.end(), from.id), retired.end());
   // Its other sides went with it, but for those whose place was seen empty.
   std::vector<Surfel> sides = moved_surfels(from.surfels, T_new_old);
-  sides.erase(std::remove_if(sides.begin(), sides.end(),
-                             [&](const Surfel& s) { return seen_empty(step.map, s.point_W); }),
-              sides.end());
+  sides.erase(
+      std::remove_if(sides.begin(), sides.end(),
+                     [&](const Surfel& s) { return seen_empty(step.distance_at, s.point_W); }),
+      sides.end());
   hide_space_behind(step, found, 0);
   found.model.add(sides);
   found.icp_target.reset();

@@ -170,7 +170,7 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   survivor.last_seen_ns = std::max(survivor.last_seen_ns, absorbed.last_seen_ns);
   survivor.companions.clear();
   mark_changed(survivor);
-  step.map.reassign_object(absorbed_id, survivor.id);
+  step.edits.reassign(absorbed_id, survivor.id);
   std::replace(step.owners.begin(), step.owners.end(), absorbed_id, survivor.id);
   for (std::size_t n = 0; n < step.look_count; ++n) {
     if (looks_[n].object != &absorbed) continue;

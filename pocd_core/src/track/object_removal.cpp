@@ -182,20 +182,23 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
                        static_cast<double>(piece) >= kPartShare * static_cast<double>(before);
   if (!is_part) return;
   const double voxel_m = config_.map.voxel_size_m, band_m = 2.0 * config_.map.truncation_m();
-  const IcpTarget gone = icp_target(lost, voxel_m, band_m);
-  std::optional<IcpTarget> standing;
-  if (!object.model.surfels().empty())
-    standing.emplace(icp_target(object.model.surfels(), voxel_m, band_m));
+  const auto gone = std::make_shared<const IcpTarget>(icp_target(lost, voxel_m, band_m));
+  const auto standing =
+      object.model.surfels().empty()
+          ? nullptr
+          : std::make_shared<const IcpTarget>(icp_target(object.model.surfels(), voxel_m, band_m));
   const OrientedBox lost_box = box_of(lost);
-  const double reach = 0.5 * lost_box.size_m.norm() + config_.map.truncation_m();
-  clear_gone(step, object.id, [&](const Eigen::Vector3d& center_W) {
-    if ((center_W - lost_box.pose.position_W).norm() > reach) return false;
-    const auto a = gone.nearest((center_W - gone.origin_W()).cast<float>());
-    if (!a) return false;
-    if (!standing) return true;
-    const auto b = standing->nearest((center_W - standing->origin_W()).cast<float>());
-    return !b || a->squared_distance_m2 < b->squared_distance_m2;
-  });
+  const double reach_m = 0.5 * lost_box.size_m.norm() + config_.map.truncation_m();
+  clear_gone(step, object.id,
+             [gone, standing, reach_m, middle_W = Eigen::Vector3d(lost_box.pose.position_W)](
+                 const Eigen::Vector3d& center_W) {
+               if ((center_W - middle_W).norm() > reach_m) return false;
+               const auto a = gone->nearest((center_W - gone->origin_W()).cast<float>());
+               if (!a) return false;
+               if (!standing) return true;
+               const auto b = standing->nearest((center_W - standing->origin_W()).cast<float>());
+               return !b || a->squared_distance_m2 < b->squared_distance_m2;
+             });
   Departure departure;
   departure.id = library_.reserve_id();
   departure.part_of = object.id;
@@ -228,29 +231,31 @@ void ObjectTracker::begin_anew(Step& step, LibraryObject& object) {
   step.evidence.erase(object.id);
 }
 
-void ObjectTracker::clear_gone(Step& step, ObjectId id,
-                               const std::function<bool(const Eigen::Vector3d&)>& inside) {
-  const Pose T_C_W = step.cloud.T_W_C.inverse();
+void ObjectTracker::clear_gone(Step& step, ObjectId id, MapEdits::Where inside) {
   const double near_m = 2.0 * config_.map.voxel_size_m;
-  const auto measured_now = [&](const Eigen::Vector3d& center_W) {
-    const auto view = view_of(step.cloud, T_C_W, center_W);
-    return view && view->depth_m >= near_m && std::abs(view->measured_m - view->depth_m) < near_m;
-  };
-  std::vector<const LibraryObject*> others;
+  // As they are now: the edit is made once all is decided.
+  std::vector<std::pair<OrientedBox, ObjectModel>> others;
   if (const LibraryObject* object = library_.find(id)) {
-    for (const ObjectId other :
+    for (const ObjectId other_id :
          library_.near(object->box.pose.position_W, 0.5 * object->box.size_m.norm())) {
-      if (other != id) others.push_back(library_.find(other));
+      const LibraryObject* other = library_.find(other_id);
+      if (other_id != id && box_overlap(other->box, object->box, 2.0 * near_m) > 0.0)
+        others.emplace_back(other->box, other->model);
     }
   }
-  step.map.clear_object_where(id, [&](const Eigen::Vector3d& center_W) {
-    if (!inside(center_W) || measured_now(center_W)) return false;
-    return std::none_of(others.begin(), others.end(), [&](const LibraryObject* other) {
-      return is_inside(other->box, near_m, center_W.cast<float>()) &&
-             other->model.nearest(center_W.cast<float>(), static_cast<float>(near_m)) !=
-                 ObjectModel::kNone;
-    });
-  });
+  step.edits.clear(
+      id, [inside = std::move(inside), others = std::move(others), near_m, &cloud = step.cloud,
+           T_C_W = Pose(step.cloud.T_W_C.inverse())](const Eigen::Vector3d& center_W) {
+        if (!inside(center_W)) return false;
+        const auto view = view_of(cloud, T_C_W, center_W);
+        const bool measured_now =
+            view && view->depth_m >= near_m && std::abs(view->measured_m - view->depth_m) < near_m;
+        return !measured_now && std::none_of(others.begin(), others.end(), [&](const auto& other) {
+          const Eigen::Vector3f center = center_W.cast<float>();
+          return is_inside(other.first, near_m, center) &&
+                 other.second.nearest(center, static_cast<float>(near_m)) != ObjectModel::kNone;
+        });
+      });
 }
 
 void ObjectTracker::remove_objects(Step& step) {
@@ -340,7 +345,7 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, Rule rule) {
   // What lapses was hidden: nobody has seen that it is not there.
   if (rule != Rule::kCandidateLapsed)
     clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
-  step.map.reassign_object(object.id, ObjectId::kNone);  // what stays is not of it
+  step.edits.reassign(object.id, ObjectId::kNone);  // what stays is not of it
   std::replace(step.owners.begin(), step.owners.end(), object.id, ObjectId::kNone);
   for (std::size_t n = 0; n < step.look_count; ++n) {
     if (looks_[n].object == &object) looks_[n].sighting.sights.clear();

@@ -43,9 +43,10 @@ ObjectTracker::ObjectTracker(const TrackerConfig& config)
 
 void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, const DepthField& field,
                            const Observations& observations, const GroundModel& ground,
-                           TsdfMap& map, std::vector<std::uint32_t>& owner_of_pixel,
-                           FrameResult& result) {
-  Step step{frame, cloud, field, observations, ground, map, result, {}, 0, {}, {}, {}, {}};
+                           const DistanceAt& distance_at, MapEdits& edits,
+                           std::vector<std::uint32_t>& owner_of_pixel, FrameResult& result) {
+  Step step{frame,  cloud, field, observations, ground, distance_at, edits,
+            result, {},    0,     {},           {},     {},          {}};
   step.sight = {config_.map.voxel_size_m, config_.change.pose_tolerance_m, config_.map.max_depth_m,
                 config_.association.icp_max_distance_m};
   join_sides(step);
@@ -107,7 +108,7 @@ void ObjectTracker::look_at_objects(Step& step) {
   parts.least_points = std::max<std::size_t>(10, least_surfels());
   step.parts = divide(
       step.observations, looks_.data(), step.look_count,
-      [&](const Eigen::Vector3f& p) { return seen_empty(step.map, p); }, parts);
+      [&](const Eigen::Vector3f& p) { return seen_empty(step.distance_at, p); }, parts);
 }
 
 void ObjectTracker::update_beliefs(Step& step) {
@@ -155,7 +156,7 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   for (Surfel& s : object.model.surfels()) s.seen_through = 0;
   look.sighting.sights.clear();  // of points that are elsewhere now
   object.icp_target.reset();
-  step.map.clear_object(object.id);
+  step.edits.clear(object.id);
   refit_box(step, object);
   measure(step, look, look.sign * look.displacement_m);
   // Change is measured from the new place on.
@@ -339,10 +340,11 @@ Arrival ObjectTracker::arrival_of(const LibraryObject& object) const {
   return share > 0.3 ? Arrival::kArrived : share > 0.1 ? Arrival::kUnknown : Arrival::kFound;
 }
 
-bool ObjectTracker::seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const {
+bool ObjectTracker::seen_empty(const DistanceAt& distance_at,
+                               const Eigen::Vector3f& point_W) const {
   if (free_space_.seen_empty(point_W)) return true;
   // Near surfaces the map knows better.
-  const auto distance_m = map.distance_at(point_W, FreeSpace::kLooks);
+  const auto distance_m = distance_at(point_W);
   return distance_m && *distance_m > kClearVoxels * config_.map.voxel_size_m;
 }
 

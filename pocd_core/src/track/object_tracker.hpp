@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "pocd/map/tsdf_map.hpp"
+#include "pocd/map/map_edits.hpp"
 #include "pocd/objects/frame_result.hpp"
 #include "pocd/observe/align_in_place.hpp"
 #include "pocd/observe/free_space.hpp"
@@ -24,6 +24,10 @@ namespace pocd {
 
 struct IcpResult;
 
+/// Distance [m] of a point [m, W] from the surface in the map, positive before it; nothing where
+/// too few looks measured it.
+using DistanceAt = std::function<std::optional<double>(const Eigen::Vector3f&)>;
+
 /// Owns the object library. Not thread-safe.
 class ObjectTracker {
  public:
@@ -31,11 +35,13 @@ class ObjectTracker {
 
   const ObjectLibrary& library() const { return library_; }
 
-  /// Updates all beliefs from one frame; fuses, adds, moves and removes objects; clears the voxels
-  /// of what is gone. `owner_of_pixel` gets, per grid pixel of an observation, the object that owns
-  /// the surface there, 0 where that is not decided yet.
+  /// Updates all beliefs from one frame; fuses, adds, moves and removes objects. `edits` gets what
+  /// becomes of the voxels of objects, to be done before the frame is integrated; `distance_at`
+  /// reads the map as the edits so far leave it. `owner_of_pixel` gets, per grid pixel of an
+  /// observation, the object that owns the surface there, 0 where that is not decided yet.
   void update(const Frame& frame, const OrganizedCloud& cloud, const DepthField& field,
-              const Observations& observations, const GroundModel& ground, TsdfMap& map,
+              const Observations& observations, const GroundModel& ground,
+              const DistanceAt& distance_at, MapEdits& edits,
               std::vector<std::uint32_t>& owner_of_pixel, FrameResult& result);
 
   /// From now on stamps go on from `now_ns`, which lies before those that are kept: all that is
@@ -50,9 +56,9 @@ class ObjectTracker {
     StampNs stamp_ns = 0;
   };
   /// Nothing is known of the object any more. For one that was reported: the event.
-  void forget(ObjectId id, const Said& said, TsdfMap& map, FrameResult& result);
+  void forget(ObjectId id, const Said& said, MapEdits& edits, FrameResult& result);
   /// The object is gone, as if cameras had seen it go.
-  void confirm_removal(ObjectId id, const Said& said, TsdfMap& map, FrameResult& result);
+  void confirm_removal(ObjectId id, const Said& said, MapEdits& edits, FrameResult& result);
   /// The event of what was said.
   void note(const Said& said, const OrientedBox& where, FrameResult& result);
   /// What was found gone, and what was seen empty there.
@@ -120,8 +126,7 @@ class ObjectTracker {
   void begin_anew(Step& step, LibraryObject& object);
   /// Clears the object's voxels where `inside` says so, but for those at which this frame or
   /// another object has a surface.
-  void clear_gone(Step& step, ObjectId id,
-                  const std::function<bool(const Eigen::Vector3d&)>& inside);
+  void clear_gone(Step& step, ObjectId id, MapEdits::Where inside);
   void remove(Step& step, LibraryObject& object, Rule rule);
   /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
   void depart(Step& step, Departure departure, Rule rule);
@@ -160,7 +165,7 @@ class ObjectTracker {
   /// `other`: the object that was joined with this one, for Rule::kJoined.
   ObjectEvent& add_event(Step& step, EventKind kind, const LibraryObject& object, Rule rule,
                          ObjectId other = ObjectId::kNone);
-  bool seen_empty(TsdfMap& map, const Eigen::Vector3f& point_W) const;
+  bool seen_empty(const DistanceAt& distance_at, const Eigen::Vector3f& point_W) const;
   Arrival arrival_of(const LibraryObject& object) const;
   /// Surfaces that are no farther apart touch each other [m].
   double contact_m() const;

@@ -17,7 +17,7 @@ ObjectEvent event_of(EventKind kind, const ObjectTracker::Said& said, std::uint6
 
 }  // namespace
 
-void ObjectTracker::forget(ObjectId id, const Said& said, TsdfMap& map, FrameResult& result) {
+void ObjectTracker::forget(ObjectId id, const Said& said, MapEdits& edits, FrameResult& result) {
   const LibraryObject* object = library_.find(id);
   POCD_CHECK(object);
   if (object->confirmed) {
@@ -28,11 +28,11 @@ void ObjectTracker::forget(ObjectId id, const Said& said, TsdfMap& map, FrameRes
     result.events.push_back(std::move(event));
     result.retired.push_back(id);
   }
-  map.clear_object(id);
+  edits.clear(id);
   library_.erase(id);
 }
 
-void ObjectTracker::confirm_removal(ObjectId id, const Said& said, TsdfMap& map,
+void ObjectTracker::confirm_removal(ObjectId id, const Said& said, MapEdits& edits,
                                     FrameResult& result) {
   const LibraryObject* object = library_.find(id);
   POCD_CHECK(object && object->confirmed);
@@ -55,7 +55,7 @@ void ObjectTracker::confirm_removal(ObjectId id, const Said& said, TsdfMap& map,
   departure.evidence = event.evidence;
   result.events.push_back(std::move(event));
   result.retired.push_back(id);
-  map.clear_object(id);
+  edits.clear(id);
   library_.erase(id);
   departures_.add(std::move(departure));
 }

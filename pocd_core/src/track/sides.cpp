@@ -93,7 +93,7 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const Libra
     bool open = line.length_m > reach_m || std::max(leaves, enters) > kOutside ||
                 (line.length_m > contact_m() && leaves + enters > -kApart);
     for (float at = cell_m; !open && at < line.length_m - 0.5f * cell_m; at += 0.5f * cell_m)
-      open = seen_empty(step.map, line.from->point_W + at * along);
+      open = seen_empty(step.distance_at, line.from->point_W + at * along);
     crossing += open;
   }
   return static_cast<double>(crossing) <= kGapShare * static_cast<double>(lines.size());
@@ -184,7 +184,7 @@ ObjectTracker::Along ObjectTracker::went_along(Step& step, const Departure& depa
       measured = true;
     }
     seen += measured;
-    if (measured || !seen_empty(step.map, s.point_W)) {
+    if (measured || !seen_empty(step.distance_at, s.point_W)) {
       sides.push_back(s);
     } else {
       ++empty;

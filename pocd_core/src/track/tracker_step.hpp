@@ -16,7 +16,8 @@ struct ObjectTracker::Step {
   const DepthField& field;
   const Observations& observations;
   const GroundModel& ground;
-  TsdfMap& map;
+  const DistanceAt& distance_at;
+  MapEdits& edits;
   FrameResult& result;
   SightConfig sight;
   std::size_t look_count = 0;

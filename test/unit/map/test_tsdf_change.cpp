@@ -4,6 +4,7 @@
 #include <map>
 
 #include "map_fixtures.hpp"
+#include "pocd/map/map_edits.hpp"
 #include "pocd/map/mesh.hpp"
 
 namespace pocd::testing {
@@ -276,6 +277,41 @@ TEST_F(ClearObject, ReassignedVoxelsBelongToTheOther) {
   EXPECT_EQ(count_owned(map, 3), 0u);
   EXPECT_EQ(map.reassign_object(ObjectId{9}, ObjectId{9}), 0u);
   EXPECT_EQ(map.clear_object(ObjectId{9}), three + nine);
+}
+
+TEST_F(ClearObject, EditsAreMadeInTheirOrderAndOnce) {
+  const auto left_half = [](const Eigen::Vector3d& center_W) { return center_W.x() < -0.4; };
+  const std::size_t three = count_owned(map, 3), nine = count_owned(map, 9);
+  MapEdits edits;
+  edits.clear(ObjectId{3}, left_half);
+  edits.reassign(ObjectId{3}, ObjectId{5});
+  edits.reassign(ObjectId{9}, ObjectId{3});
+  EXPECT_EQ(count_owned(map, 3), three) << "noted only";
+  // What is asked of the map meanwhile knows of the edits.
+  int asked = 0;
+  for (const BlockKey& key : map.sorted_keys()) {
+    const VoxelBlock block = *map.find(key);
+    for (int v = 0; v < VoxelBlock::kVoxels; ++v) {
+      if (block.weight[v] == 0) continue;
+      const Eigen::Vector3d at = voxel_center(key, v, 0.05);
+      EXPECT_EQ(map.distance_at(at.cast<float>(), 1, edits).has_value(),
+                !(block.owner[v] == 3 && left_half(at)));
+      ++asked;
+    }
+  }
+  EXPECT_GT(asked, 1000);
+  edits.apply_to(map);
+  const std::size_t rest = count_owned(map, 5);
+  EXPECT_GT(rest, three / 4);
+  EXPECT_LT(rest, 3 * three / 4);
+  EXPECT_EQ(count_owned(map, 3), nine) << "what came later under its number is another thing's";
+  EXPECT_EQ(count_owned(map, 9), 0u);
+  edits.apply_to(map);
+  EXPECT_EQ(count_owned(map, 3), nine);
+  edits.clear(ObjectId{3});
+  edits.apply_to(map);
+  EXPECT_EQ(count_owned(map, 3), 0u);
+  EXPECT_EQ(count_owned(map, 5), rest);
 }
 
 TEST_F(ClearObject, OwnersWrittenByHandAreFound) {

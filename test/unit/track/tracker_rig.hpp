@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../../../pocd_core/src/track/object_tracker.hpp"
+#include "pocd/map/tsdf_map.hpp"
 #include "test_room.hpp"
 
 namespace pocd::test {
@@ -35,7 +36,13 @@ class TrackerRig {
     if (edit) edit(s);
     field_.update(s.cloud);
     FrameResult result;
-    tracker_.update(frame, s.cloud, field_, s.observations, ground_, map_, owners_, result);
+    MapEdits edits;
+    const auto distance_at = [&](const Eigen::Vector3f& point_W) {
+      return map_.distance_at(point_W, FreeSpace::kLooks, edits);
+    };
+    tracker_.update(frame, s.cloud, field_, s.observations, ground_, distance_at, edits, owners_,
+                    result);
+    edits.apply_to(map_);
     IntegrationInput input;
     input.frame = &frame;
     input.owners = owners_.data();

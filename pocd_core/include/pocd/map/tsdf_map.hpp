@@ -8,45 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "pocd/common/describe.hpp"
 #include "pocd/common/thread_pool.hpp"
 #include "pocd/common/types.hpp"
 #include "pocd/input/frame.hpp"
-#include "pocd/map/map_memory.hpp"
+#include "pocd/map/map_edits.hpp"
 #include "pocd/map/region_source.hpp"
+#include "pocd/map/tsdf_config.hpp"
 #include "pocd/map/voxel_block.hpp"
 
 namespace pocd {
 
 class BlockStore;
-
-struct TsdfConfig {
-  double voxel_size_m = 0.05;
-  double truncation_voxels = 4.0;
-  double max_depth_m = 3.0;
-  bool clear_beyond_limit = false;
-  int max_weight = 100;
-  int min_publish_weight = 1;
-  MapMemoryConfig memory;
-
-  double truncation_m() const { return truncation_voxels * voxel_size_m; }
-
-  template <class Visitor>
-  void describe(Visitor& visit) {
-    visit("voxel_size_m", voxel_size_m, Range{0.002, 1.0}, "Edge of a voxel [m].");
-    visit("truncation_voxels", truncation_voxels, Range{2.0, 16.0},
-          "Truncation distance of the signed distance [voxels].");
-    visit("max_depth_m", max_depth_m, Range{0.1, 100.0},
-          "Depth beyond which a pixel is not used, theta_depth [m].");
-    visit("clear_beyond_limit", clear_beyond_limit,
-          "A pixel beyond max_depth_m still shows that all before that depth is free.");
-    visit("max_weight", max_weight, Range{1, 1000},
-          "Cap of a voxel's weight [observations]: smaller reacts faster, larger averages longer.");
-    visit("min_publish_weight", min_publish_weight, Range{1, 1000},
-          "Weight at which a voxel counts as observed in published tiles [observations].");
-    visit.group("memory", memory, "How much memory the voxels may take.");
-  }
-};
 
 /// What integrate_frame needs beside the frame.
 struct IntegrationInput {
@@ -112,9 +84,10 @@ class TsdfMap {
   /// memory, as all are without a budget: MapReader finds those on disk.
   const VoxelBlock* find(const BlockKey& key) const;
   /// Signed distance [m] of the voxel that holds the point, positive in front of a surface; nothing
-  /// where fewer than `min_weight` looks measured it. Brings its region back to memory: what is on
-  /// disk must not change what follows.
-  std::optional<double> distance_at(const Eigen::Vector3f& point_W, int min_weight);
+  /// where fewer than `min_weight` looks measured it, or once the pending edits are made. Brings its
+  /// region back to memory: what is on disk must not change what follows.
+  std::optional<double> distance_at(const Eigen::Vector3f& point_W, int min_weight,
+                                    const MapEdits& pending = {});
   /// For tests and loading: the block at key, allocated when missing; marked dirty.
   VoxelBlock& touch(const BlockKey& key);
   /// Keys of all blocks in canonical order (BlockKey::operator<).

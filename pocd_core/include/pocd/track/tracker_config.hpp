@@ -5,7 +5,7 @@
 #include "pocd/belief/state_config.hpp"
 #include "pocd/input/class_map.hpp"
 #include "pocd/input/depth_noise.hpp"
-#include "pocd/map/tsdf_map.hpp"
+#include "pocd/map/tsdf_config.hpp"
 #include "pocd/observe/association_config.hpp"
 #include "pocd/segmentation/segmentation_config.hpp"
 
