@@ -261,8 +261,8 @@ stage.after.push(() => {
 let showsNew = false;  // the frame that is under way shows a surface that the one before did not
 stage.after.push(() => {
   showsNew = surface.drawn();
-  if (surface.changed.size > 0) stage.askSoon();
   other?.surface.drawn();
+  if (surface.changed.size > 0 || other?.surface.changed.size > 0) stage.askSoon();
 });
 stage.finished.push(() => {
   if (!showsNew) return;
