@@ -141,9 +141,11 @@ export class Surface {
   /** Chunks [x, y, z, last look] of a sector that nobody has looked at since the node was started. */
   useLooks({ sector, not_looked_at: list }) {
     const keys = new Map(list.map(([x, y, z, stamp]) => [keyOf(x, y, z), stamp]));
-    const changed = new Set([...keys.keys(), ...(this.sectors.get(sector)?.keys() ?? [])]);
+    const before = this.sectors.get(sector) ?? new Map();
     this.sectors.set(sector, keys);
-    for (const key of changed) if (this.chunks.has(key)) this.drawAgain(this.chunks.get(key));
+    for (const key of new Set([...keys.keys(), ...before.keys()])) {
+      if (keys.has(key) !== before.has(key) && this.chunks.has(key)) this.drawAgain(this.chunks.get(key));
+    }
   }
 
   /** Stamp of the last look at a chunk that nobody has looked at since the restart; undefined for others. */
