@@ -1,12 +1,17 @@
-// Messages that Rerun's reader does not take, in messages that it takes; no bus is needed.
+// Messages that Rerun's reader does not take, in messages that it takes; and what `pocd_record`
+// says of those that it leaves out.
 #include <gtest/gtest.h>
 
 #include <cstring>
 
+#include "bus_processes.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "pocd/common/random.hpp"
+#include "pocd/recording/recording_reader.hpp"
 #include "pocd_dds/entities/topic_table.hpp"
+#include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/recording/rerun_form.hpp"
+#include "recordings.hpp"
 #include "sensor_msgsPubSubTypes.h"
 #include "tf2_msgsPubSubTypes.h"
 #include "visualization_msgsPubSubTypes.h"
@@ -257,6 +262,42 @@ TEST(RerunForm, DamagedMessagesAndOtherTopicsStay) {
   EXPECT_TRUE(topic_of(made));
   made.metadata[kMadeOf] = "/pocd/objects/markers";
   EXPECT_FALSE(topic_of(made));
+}
+
+TEST(RerunForm, TheRecorderNamesAndCountsWhatItLeavesOut) {
+  const recording::TemporaryFolder folder;
+  Process recorder({command("pocd_record"), "--output", (folder / "run.mcap").string(), "--rerun"});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  const auto participant =
+      std::make_shared<Participant>(BusOptions{std::stoi(test_domain()), "", "markers_of_a_test"});
+  Writer<visualization_msgs::msg::MarkerArrayPubSubType> writer(participant, topics::kMarkers);
+  while (writer.matched() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  Marker text = box(2, 0.0);
+  text.type(9);
+  for (const std::vector<Marker>& list :
+       {std::vector<Marker>{box(1, 0.0)}, {text, box(1, 0.0)}, {text, text, box(3, 1.0)}}) {
+    MarkerArray array;
+    array.markers(list);
+    writer.write(array);
+    ASSERT_TRUE(writer.wait_acknowledged(std::chrono::seconds(60)));
+  }
+  const CommandResult recorded = stop(recorder);
+  EXPECT_NE(
+      recorded.out.find(
+          "not in the form for Rerun: 3 of /pocd/objects/markers: markers of type 9 (text)\n"),
+      std::string::npos)
+      << recorded.out;
+  // Each thing once, when it comes first.
+  const std::string warning = "Rerun will not show markers of type 9 (text)";
+  const std::size_t first = recorded.err.find(warning);
+  EXPECT_NE(first, std::string::npos) << recorded.err;
+  EXPECT_EQ(recorded.err.find(warning, first + 1), std::string::npos) << recorded.err;
+  // The recording has all of them.
+  std::map<std::string, int> messages;
+  const auto reader = recording::open_recording(folder / "run.mcap");
+  for (const recording::Kept& kept : recording::read_all(*reader)) ++messages[kept.topic];
+  EXPECT_EQ(messages["/pocd/objects/markers"], 3);
+  EXPECT_EQ(messages["/pocd/objects/markers/rerun"], 3);
 }
 
 }  // namespace

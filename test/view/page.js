@@ -4,6 +4,7 @@
 const fs = require("fs");
 const path = require("path");
 const puppeteer = require("puppeteer-core");
+const { checkBuffers } = require("./buffers.js");
 const { node, play, view, until, check, main } = require("./processes.js");
 
 const [chromium, folder] = process.argv.slice(2);
@@ -55,6 +56,12 @@ main(async () => {
 
   await until(async () => (await state()) === "no map yet", "a page without a map says so");
   await shot("waiting");
+
+  const buffers = await page.evaluate(checkBuffers);
+  check(buffers.wrong.length === 0, `what is drawn is what was put: ${buffers.wrong}`);
+  check(buffers.drawn === 1500 * 1500, `all is drawn in the end: ${buffers.drawn} triangles`);
+  // 4 MB, and the buffer that goes beyond: of 32768 vertices at most, and what belongs to them.
+  check(buffers.frames > 5 && buffers.most < 6 << 20, `a frame hands over a bounded piece: ${buffers.most} bytes at most, in ${buffers.frames} frames`);
 
   // A run: two robots, things that move, go and come.
   let component = node("--robot", "robot1", "--robot", "robot2", "--lossless");
@@ -208,7 +215,7 @@ main(async () => {
   const paused = await page.evaluate(() => [window.pocd.time.playing, window.pocd.time.at]);
   check(!paused[0] && paused[1] !== null, "it pauses");
   await page.keyboard.press("n");
-  await holds("all tiles are back after playing", (now) => window.pocd.surface.tileCount === now && ![...window.pocd.surface.chunks.values()].some((chunk) => chunk.dirty), counts.tiles);
+  await holds("all tiles are back after playing", (now) => window.pocd.surface.tileCount === now && window.pocd.surface.changed.size === 0, counts.tiles);
   const asPlayed = await difference(asNow, await picture());
   check(asPlayed < 0.01, `now looks as it did before playing: ${asPlayed}`);
 

@@ -148,6 +148,34 @@ std::vector<TileKey> tiles_drawn_with(const TileKey& key) {
   return keys;
 }
 
+namespace {
+
+/// Appends those triangles of `mesh` of which every corner is `lone`, made coarser by half a cube.
+void append_lone(const TileMesh& mesh, const std::vector<bool>& lone, int cell_voxels,
+                 TileMesh& coarse) {
+  TileMesh left_out;
+  std::map<std::uint32_t, std::uint32_t> number_of;
+  for (const auto& triangle : mesh.triangles) {
+    if (!lone[triangle[0]] || !lone[triangle[1]] || !lone[triangle[2]]) continue;
+    std::array<std::uint32_t, 3>& corner = left_out.triangles.emplace_back();
+    for (int i = 0; i < 3; ++i) {
+      const auto next = static_cast<std::uint32_t>(left_out.vertices.size());
+      const auto [known, is_new] = number_of.emplace(triangle[i], next);
+      if (is_new) left_out.vertices.push_back(mesh.vertices[triangle[i]]);
+      corner[i] = known->second;
+    }
+  }
+  if (left_out.triangles.empty()) return;
+  if (cell_voxels > 1) left_out = coarsened(left_out, cell_voxels / 2);
+  const auto first = static_cast<std::uint32_t>(coarse.vertices.size());
+  coarse.vertices.insert(coarse.vertices.end(), left_out.vertices.begin(), left_out.vertices.end());
+  for (const auto& triangle : left_out.triangles) {
+    coarse.triangles.push_back({first + triangle[0], first + triangle[1], first + triangle[2]});
+  }
+}
+
+}  // namespace
+
 TileMesh coarsened(const TileMesh& mesh, int cell_voxels) {
   POCD_CHECK(cell_voxels > 0);
   struct Cluster {
@@ -193,6 +221,14 @@ TileMesh coarsened(const TileMesh& mesh, int cell_voxels) {
   std::sort(coarse.triangles.begin(), coarse.triangles.end());
   coarse.triangles.erase(std::unique(coarse.triangles.begin(), coarse.triangles.end()),
                          coarse.triangles.end());
+  // What stands alone in its cubes would be gone.
+  std::vector<bool> drawn(coarse.vertices.size(), false);
+  for (const auto& triangle : coarse.triangles) {
+    for (const std::uint32_t v : triangle) drawn[v] = true;
+  }
+  std::vector<bool> lone(mesh.vertices.size());
+  for (std::size_t v = 0; v < lone.size(); ++v) lone[v] = !drawn[clusters[cell_of[v]].number];
+  append_lone(mesh, lone, cell_voxels, coarse);
   return coarse;
 }
 

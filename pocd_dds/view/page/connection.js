@@ -1,4 +1,5 @@
 // The link to pocd_view: messages of pieces in, wishes out; connects again by itself.
+import { attach, openSocket } from "./socket.js";
 
 const kJson = 1, kTile = 2, kChunk = 3, kChunkDone = 4;
 const kSilence = 4000;  // a status comes every second [ms]
@@ -61,21 +62,17 @@ export class Connection {
   }
 
   connect() {
-    const token = new URLSearchParams(location.search).get("token");
-    const query = token ? `?token=${encodeURIComponent(token)}` : "";
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    const socket = new WebSocket(`${scheme}://${location.host}/live${query}`, "pocd.view.v1");
-    socket.binaryType = "arraybuffer";
+    const opened = openSocket(), { socket } = opened;
     this.socket = socket;
     this.heard = Date.now();
     let chain = Promise.resolve();
-    socket.onopen = () => {
+    const onopen = () => {
       this.retry = 500;
       this.use({ kind: "json", json: { type: "reset" } });
       for (const [name, value] of this.wishes) this.send({ [name]: value });
       this.tell("open");
     };
-    socket.onmessage = (message) => {
+    const onmessage = (message) => {
       this.heard = Date.now();
       this.bytes += message.data.byteLength;
       this.tell("open");
@@ -89,12 +86,14 @@ export class Connection {
         socket.close();
       });
     };
-    socket.onclose = () => {
+    const onclose = () => {
       if (socket !== this.socket || this.ended) return;
       this.tell("closed");
       setTimeout(() => this.connect(), this.retry);
       this.retry = Math.min(2 * this.retry, 5000);
     };
+    // Not before who made this connection is ready for what has come already.
+    queueMicrotask(() => attach(opened, { onopen, onmessage, onclose }));
   }
 
   watch() {

@@ -105,11 +105,14 @@ export function boxCorners([x, y, z, yaw, along, across, up]) {
   return corners;
 }
 
+/** How high the arrow from a to b rises over both [m]. */
+export const arrowRise = (a, b) => Math.min(0.5 * Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]), 1.2);
+
 /** An arc from a to b that ends in an arrow's head, as segments. */
 export function arrow(a, b) {
   const reach = Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
   if (reach < 1e-3) return [];
-  const points = [], steps = 16, rise = Math.min(0.35 * reach, 1.2);
+  const points = [], steps = 16, rise = arrowRise(a, b);
   for (let i = 0; i <= steps; ++i) {
     const t = i / steps;
     points.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]) + 4 * t * (1 - t) * rise]);
@@ -117,7 +120,7 @@ export function arrow(a, b) {
   const segments = points.slice(1).map((p, i) => [points[i], p]);
   const tip = points[steps], tail = points[steps - 3];
   const d = [tip[0] - tail[0], tip[1] - tail[1], tip[2] - tail[2]];
-  const length = Math.hypot(...d), head = Math.min(0.22, 0.35 * reach);
+  const length = Math.hypot(...d), head = Math.min(0.3, 0.45 * reach);
   const side = Math.hypot(d[0], d[1]) > 1e-6 ? [-d[1], d[0]] : [1, 0];
   const norm = Math.hypot(...side);
   for (const sign of [-1, 1]) {

@@ -26,7 +26,7 @@ let drawn = false, cut = Infinity, restored = false;
 const times = { first: null, whole: null, last: null };
 
 const connection = new Connection(use, (link) => health.setLink(link));
-const stage = new Stage($("canvas"));
+const stage = new Stage();
 const store = new ObjectStore();
 const health = new Health();
 const surface = new Surface(stage.scene, (list) => connection.wish("want", list));
@@ -259,10 +259,10 @@ stage.after.push(() => {
 });
 
 let showsNew = false;  // the frame that is under way shows a surface that the one before did not
-let shownLast = null;
 stage.after.push(() => {
-  showsNew = times.last !== shownLast;
-  shownLast = times.last;
+  showsNew = surface.drawn();
+  other?.surface.drawn();
+  if (surface.changed.size > 0 || other?.surface.changed.size > 0) stage.askSoon();
 });
 stage.finished.push(() => {
   if (!showsNew) return;

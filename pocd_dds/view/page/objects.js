@@ -1,7 +1,8 @@
 // Objects as they are known, and the drawing of boxes, ghosts and arrows.
 import * as THREE from "./three/build/three.module.js";
 import { colourOfScore, rgbOf } from "./colours.js";
-import { Lines, arrow, boxCorners, boxEdges } from "./lines.js";
+import { Lines, arrow, arrowRise, boxCorners, boxEdges } from "./lines.js";
+import { nameOf } from "./words.js";
 import { rayBox } from "./stage.js";
 
 const kGlide = 500;  // a box that moves is seen to move [ms]
@@ -72,8 +73,10 @@ export class ObjectLayer {
       }
       faces.push([object.box, rgb, chosen ? 0.34 : unknown ? 0.10 : 0.20]);
       this.shown.push({ id: object.id, box: object.box });
-      this.labels.push({ id: object.id, at: [object.box[0], object.box[1], object.box[2] + object.box[6] / 2 + 0.1],
-        text: `${object.class} #${object.number}${unknown ? " ?" : ""}`,
+      // Over the arrow of what moved, whose head is on the box.
+      const over = kind === "MOVED" ? 0.15 + 1.6 * arrowRise(changed.get(object.id).previous, changed.get(object.id).box) : 0.1;
+      this.labels.push({ id: object.id, at: [object.box[0], object.box[1], object.box[2] + object.box[6] / 2 + over],
+        text: `${kind ? `${kind.toLowerCase()}: ` : ""}${nameOf(object)}${unknown ? " ?" : ""}`,
         kind: unknown ? "unknown" : kind === "MOVED" ? "moved" : kind === "ADDED" ? "added" : "", rank: chosen ? 0 : kind ? 1 : 2 });
     }
     for (const event of changes) this.ghost(event, colours, selected, faces);
@@ -92,12 +95,12 @@ export class ObjectLayer {
     for (const [a, b] of boxEdges(box)) this.lines.add(a, b, rgb, event.id === selected ? 3 : 2, 0.95, 0.16);
     if (event.kind === "MOVED") {
       const lift = (b) => [b[0], b[1], b[2] + b[6] / 2 + 0.05];
-      for (const [a, b] of arrow(lift(box), lift(event.box))) this.top.add(a, b, rgb, 3.2);
+      for (const [a, b] of arrow(lift(box), lift(event.box))) this.top.add(a, b, rgb, 4);
       return;
     }
     faces.push([box, rgb, 0.10]);
     this.shown.push({ id: event.id, box });
-    this.labels.push({ id: event.id, at: [box[0], box[1], box[2] + box[6] / 2 + 0.1], text: `removed: ${event.class} #${event.number}`, kind: "removed",
+    this.labels.push({ id: event.id, at: [box[0], box[1], box[2] + box[6] / 2 + 0.1], text: `removed: ${nameOf(event)}`, kind: "removed",
       rank: event.id === selected ? 0 : 1 });
   }
 

@@ -1,7 +1,7 @@
 // Camera, controls and frames: what is drawn from where, and where a click leads.
 import * as THREE from "./three/build/three.module.js";
 import { OrbitControls } from "./three/examples/jsm/controls/OrbitControls.js";
-import { contextOf } from "./gl.js";
+import { context } from "./gl.js";
 
 THREE.Object3D.DefaultUp.set(0, 0, 1);
 const kFlight = 650;  // [ms]
@@ -11,14 +11,15 @@ const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 export class Stage {
   /** `frame(camera, rect)` is called before each frame is drawn, once, or once per half. */
-  constructor(canvas) {
+  constructor() {
+    const { canvas, gl, software } = context();
     this.canvas = canvas;
-    const { gl, software } = contextOf(canvas);
     this.gl = gl;
     this.software = software;
     this.renderer = new THREE.WebGLRenderer({ canvas, context: gl });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, software ? 1 : 2));
     this.renderer.autoClear = false;
+    this.renderer.debug.checkShaderErrors = false;  // to ask is to wait for the graphics
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(45, 1, 0.1, 2000);
     this.camera.position.set(-9, -9, 10);
@@ -55,7 +56,7 @@ export class Stage {
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
-    if (width === 0 || height === 0) return;
+    if (width === 0 || height === 0 || (width === this.width && height === this.height)) return;
     this.width = width;
     this.height = height;
     this.renderer.setSize(width, height, false);

@@ -1,31 +1,32 @@
 // The surface of the map in chunks: coarse everywhere, fine where the camera is near.
 import * as THREE from "./three/build/three.module.js";
+import { Buffers, kChunkVoxels, kSteps } from "./buffers.js";
 
-const kSteps = 15, kTileVoxels = 16, kChunkTiles = 4;
-const kChunkVoxels = kTileVoxels * kChunkTiles;
+const kTileVoxels = 16, kChunkTiles = 4;
 const kPalette = 256;         // side of the texture with one colour per owner
-const kRebuilding = 8;        // in each frame [ms]
+const kWriting = 4 << 20;     // bytes that a frame hands to the graphics, and the surface that goes beyond: a picture comes early, and none takes long
+const kPreparing = 8;         // in each turn [ms]
 const kCoarseCell = 8;        // voxels between vertices of a coarse surface
 const kLargestCell = 3;       // pixels: where it looks larger, the fine surface is wanted
 const kLargestOfSoftware = 12;
 const coarsePointer = matchMedia("(pointer: coarse)").matches;
 const kMostFine = 400, kFewFine = 96;  // chunks
-const kSphere = new THREE.Sphere(new THREE.Vector3().setScalar(kSteps * kChunkVoxels / 2), kSteps * kChunkVoxels);
-
 const vertexShader = `
 precision highp float;
-attribute vec4 position;  // 1/15 voxel in the chunk, and the owner's place in the palette
-attribute vec4 normal;    // w > 0: from an earlier run
+attribute vec4 position;  // 1/15 voxel in the cell, and the owner's place in the palette
+attribute vec2 facing;    // four bytes: the normal (signed), and 1 for an earlier run or what nobody has looked at
 uniform mat4 modelMatrix, viewMatrix, projectionMatrix;
 uniform sampler2D palette;
-varying vec3 world, facing;
+varying vec3 world, normal;
 varying vec4 owner;
 varying float earlier;
 void main() {
   vec4 at = modelMatrix * vec4(position.xyz, 1.0);
   world = at.xyz;
-  facing = normal.xyz;
-  earlier = normal.w > 0.001 ? 1.0 : 0.0;
+  vec2 high = floor(facing / 256.0), low = facing - 256.0 * high;
+  normal = vec3(low.x, high.x, low.y);
+  normal -= 256.0 * step(127.5, normal);
+  earlier = high.y > 0.5 ? 1.0 : 0.0;
   float slot = position.w;
   owner = texture2D(palette, (vec2(mod(slot, 256.0), floor(slot / 256.0)) + 0.5) / 256.0);
   gl_Position = projectionMatrix * viewMatrix * at;
@@ -33,20 +34,20 @@ void main() {
 const fragmentShader = `
 precision highp float;
 uniform vec3 wall, ground, floorColour, eye;
-uniform float cut, dim, reach, unlooked;
-varying vec3 world, facing;
+uniform float cut, dim, reach;
+varying vec3 world, normal;
 varying vec4 owner;
 varying float earlier;
 void main() {
   if (world.z > cut) discard;
-  vec3 n = normalize(facing);
+  vec3 n = normalize(normal);
   vec3 toEye = normalize(eye - world);
   float sun = max(dot(n, normalize(vec3(0.45, 0.3, 0.84))), 0.0);
   float head = max(dot(n, toEye), 0.0);
   float light = 0.5 + 0.32 * sun + 0.26 * head;
   float flat_ = smoothstep(0.75, 0.95, n.z);
   vec3 base = mix(mix(wall, floorColour, flat_), owner.rgb, owner.a * (1.0 - dim));
-  if (earlier + unlooked > 0.5) {
+  if (earlier > 0.5) {
     float stripe = step(0.5, fract((world.x + world.y + world.z) * 3.0));
     base = mix(mix(base, ground, 0.55), ground, 0.35 * stripe);
   }
@@ -58,7 +59,14 @@ const keyOf = (x, y, z) => `${x},${y},${z}`;
 
 class Chunk {
   constructor(x, y, z) {
-    Object.assign(this, { x, y, z, coarse: null, tiles: new Map(), fine: null, wanted: false, done: false, dirty: false });
+    // `shown`: what is drawn of it, surface -> its place in the buffers.
+    Object.assign(this, { x, y, z, coarse: null, tiles: new Map(), wanted: false, done: false, shown: new Map() });
+  }
+
+  /** The surfaces that are to be drawn. One that is shown coarsely waits until all of its tiles are there. */
+  get chosen() {
+    if (this.wanted && this.tiles.size > 0 && (this.done || !this.coarse)) return [...this.tiles.values()];
+    return this.coarse ? [this.coarse] : [];
   }
 }
 
@@ -78,20 +86,21 @@ export class Surface {
       palette: { value: this.palette }, wall: { value: new THREE.Color() }, floorColour: { value: new THREE.Color() },
       ground: { value: new THREE.Color() }, eye: { value: new THREE.Vector3() }, cut: { value: 1e6 }, dim: { value: 0 }, reach: { value: 400 },
     };
-    const material = (unlooked) => new THREE.RawShaderMaterial({ uniforms: { ...this.uniforms, unlooked: { value: unlooked } }, vertexShader, fragmentShader, side: THREE.FrontSide });
-    this.material = material(0);
-    this.unlooked = material(1);  // of chunks that nobody has looked at since the restart
+    this.material = new THREE.RawShaderMaterial({ uniforms: this.uniforms, vertexShader, fragmentShader, side: THREE.FrontSide });
+    this.buffers = new Buffers(this.group, this.material, (mesh, ...corner) => this.place(mesh, corner));
+    this.changed = new Set();     // chunks of which something else is to be drawn
     this.sectors = new Map();     // "x/y/z" -> keys of such chunks
     // A triangle without area: the shader is made ready while the first surfaces are on their way.
     const nothing = new THREE.BufferGeometry();
-    for (const name of ["position", "normal"]) nothing.setAttribute(name, new THREE.BufferAttribute(new Float32Array(12), 4));
+    for (const [name, size] of [["position", 4], ["facing", 2]]) nothing.setAttribute(name, new THREE.BufferAttribute(new Uint16Array(3 * size), size));
     this.first = new THREE.Mesh(nothing, this.material);
     this.first.frustumCulled = false;
     this.group.add(this.first);
     this.lastWish = "";
     this.tileCount = 0;
-    this.triangles = 0;
   }
+
+  get triangles() { return this.buffers.triangles; }
 
   setTheme(theme) {
     this.uniforms.wall.value.setHex(theme.wall);
@@ -122,19 +131,21 @@ export class Surface {
   setRun(run, voxel) {
     if (voxel > 0 && voxel !== this.voxel) {
       this.voxel = voxel;
-      for (const chunk of this.chunks.values()) this.place(chunk);
+      this.buffers.placeAgain();
     }
     if (run === this.run) return;
     this.run = run;
-    for (const chunk of this.chunks.values()) chunk.dirty = true;
+    for (const chunk of this.chunks.values()) this.drawAgain(chunk);
   }
 
   /** Chunks [x, y, z, last look] of a sector that nobody has looked at since the node was started. */
   useLooks({ sector, not_looked_at: list }) {
     const keys = new Map(list.map(([x, y, z, stamp]) => [keyOf(x, y, z), stamp]));
-    const changed = new Set([...keys.keys(), ...(this.sectors.get(sector)?.keys() ?? [])]);
+    const before = this.sectors.get(sector) ?? new Map();
     this.sectors.set(sector, keys);
-    for (const key of changed) if (this.chunks.has(key)) this.dress(this.chunks.get(key));
+    for (const key of new Set([...keys.keys(), ...before.keys()])) {
+      if (keys.has(key) !== before.has(key) && this.chunks.has(key)) this.drawAgain(this.chunks.get(key));
+    }
   }
 
   /** Stamp of the last look at a chunk that nobody has looked at since the restart; undefined for others. */
@@ -143,9 +154,10 @@ export class Surface {
     return this.sectors.get(sector)?.get(keyOf(chunk.x, chunk.y, chunk.z));
   }
 
-  dress(chunk) {
-    const material = this.lastLook(chunk) === undefined ? this.material : this.unlooked;
-    for (const mesh of [chunk.coarse, chunk.fine]) if (mesh) mesh.material = material;
+  /** All of it, in the next frames: it looks different. */
+  drawAgain(chunk) {
+    chunk.again = true;
+    this.changed.add(chunk);
   }
 
   end() {
@@ -156,11 +168,9 @@ export class Surface {
 
   clear() {
     this.sectors.clear();
-    for (const chunk of this.chunks.values()) {
-      this.show(chunk, "coarse", null);
-      this.show(chunk, "fine", null);
-    }
+    for (const chunk of this.chunks.values()) for (const place of chunk.shown.values()) this.buffers.remove(place);
     this.chunks.clear();
+    this.changed.clear();
     this.tileCount = 0;
   }
 
@@ -170,101 +180,54 @@ export class Surface {
     return this.chunks.get(key);
   }
 
-  use(piece) {
-    if (piece.kind === "chunk") {
-      const chunk = this.chunk(piece.x, piece.y, piece.z);
-      this.show(chunk, "coarse", piece.surface ? this.merged([{ ...piece, dx: 0, dy: 0, dz: 0 }]) : null);
-    } else if (piece.kind === "tile") {
-      const [cx, cy, cz] = [piece.x, piece.y, piece.z].map((v) => Math.floor(v / kChunkTiles));
-      const chunk = this.chunk(cx, cy, cz);
+  use({ kind, x, y, z, run, surface }) {
+    const [cx, cy, cz] = kind === "tile" ? [x, y, z].map((v) => Math.floor(v / kChunkTiles)) : [x, y, z];
+    const chunk = this.chunk(cx, cy, cz);
+    if (kind === "chunk") {
+      chunk.coarse = surface ? { surface, run, offset: [0, 0, 0] } : null;
+    } else if (kind === "tile") {
       chunk.wanted = true;  // it was asked for; what is not wanted any more goes with the next choice
-      const key = keyOf(piece.x, piece.y, piece.z);
+      const key = keyOf(x, y, z);
       this.tileCount -= chunk.tiles.has(key) ? 1 : 0;
-      if (piece.surface) {
-        chunk.tiles.set(key, { ...piece, dx: piece.x - 4 * cx, dy: piece.y - 4 * cy, dz: piece.z - 4 * cz });
+      if (surface) {
+        const offset = [x - kChunkTiles * cx, y - kChunkTiles * cy, z - kChunkTiles * cz].map((tiles) => tiles * kTileVoxels * kSteps);
+        chunk.tiles.set(key, { surface, run, offset });
         this.tileCount += 1;
       } else {
         chunk.tiles.delete(key);
       }
-      chunk.dirty = true;
-    } else if (piece.kind === "done") {
-      const chunk = this.chunk(piece.x, piece.y, piece.z);
+    } else if (kind === "done") {
       chunk.done = chunk.wanted;
     }
+    this.changed.add(chunk);
   }
 
-  /** One geometry of several surfaces; owners become places in the palette. */
-  merged(parts) {
-    let vertices = 0, indices = 0;
-    for (const { surface } of parts) {
-      vertices += surface.vertices;
-      indices += surface.index.length;
+  /** Draws of a chunk what is to be drawn of it; what is drawn already stays. True when something is different. */
+  draw(chunk) {
+    const chosen = new Set(chunk.chosen), before = chunk.shown.size;
+    let changes = 0;
+    for (const [part, place] of chunk.shown) {
+      if (chosen.has(part) && !chunk.again) continue;
+      this.buffers.remove(place);
+      chunk.shown.delete(part);
+      ++changes;
     }
-    const position = new Uint16Array(4 * vertices), normal = new Int8Array(4 * vertices);
-    const index = vertices > 65535 ? new Uint32Array(indices) : new Uint16Array(indices);
-    const box = new THREE.Box3(), corner = new THREE.Vector3();
-    let v = 0, i = 0;
-    for (const { surface, run, dx, dy, dz } of parts) {
-      const slots = [...surface.owners].map((owner) => this.slotOf(run, owner));
-      const words = new Uint16Array(surface.bytes.buffer), bytes = new Int8Array(surface.bytes.buffer);
-      const [ox, oy, oz] = [dx, dy, dz].map((tiles) => tiles * kTileVoxels * kSteps);
-      const old = run !== this.run ? 1 : 0;
-      for (let n = 0; n < surface.vertices; ++n) {
-        const to = 4 * (v + n), from = 6 * n;
-        position[to] = words[from] + ox;
-        position[to + 1] = words[from + 1] + oy;
-        position[to + 2] = words[from + 2] + oz;
-        position[to + 3] = slots[words[from + 3]] ?? 0;
-        box.expandByPoint(corner.set(position[to], position[to + 1], position[to + 2]));
-        normal[to] = bytes[12 * n + 8];
-        normal[to + 1] = bytes[12 * n + 9];
-        normal[to + 2] = bytes[12 * n + 10];
-        normal[to + 3] = old || bytes[12 * n + 11] ? 127 : 0;
-      }
-      for (let n = 0; n < surface.index.length; ++n) index[i + n] = surface.index[n] + v;
-      v += surface.vertices;
-      i += surface.index.length;
+    chunk.again = false;
+    const unlooked = this.lastLook(chunk) !== undefined;
+    for (const part of chosen) {
+      if (chunk.shown.has(part)) continue;
+      const slots = Array.from(part.surface.owners, (owner) => this.slotOf(part.run, owner));
+      chunk.shown.set(part, this.buffers.put(chunk, part.surface, part.offset, slots, unlooked || part.run !== this.run));
+      ++changes;
     }
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(position, 4));
-    geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 4, true));
-    geometry.setIndex(new THREE.BufferAttribute(index, 1));
-    geometry.boundingBox = box;
-    geometry.boundingSphere = kSphere;
-    return geometry;
+    if (before === 0 && changes > 0) this.group.remove(this.first);
+    return changes > 0;
   }
 
-  show(chunk, level, geometry) {
-    if (chunk[level]) {
-      this.group.remove(chunk[level]);
-      this.triangles -= chunk[level].geometry.index.count / 3;
-      chunk[level].geometry.dispose();
-      chunk[level] = null;
-    }
-    if (geometry) {
-      this.group.remove(this.first);
-      chunk[level] = new THREE.Mesh(geometry, this.material);
-      this.triangles += geometry.index.count / 3;
-      this.group.add(chunk[level]);
-      this.dress(chunk);
-      this.place(chunk);
-    }
-    this.choose(chunk);
-  }
-
-  choose(chunk) {
-    const fine = chunk.wanted && chunk.fine && (chunk.done || !chunk.coarse);
-    if (chunk.fine) chunk.fine.visible = Boolean(fine);
-    if (chunk.coarse) chunk.coarse.visible = !fine;
-  }
-
-  place(chunk) {
-    for (const mesh of [chunk.coarse, chunk.fine]) {
-      if (!mesh) continue;
-      mesh.scale.setScalar(this.voxel / kSteps);
-      mesh.position.set(chunk.x, chunk.y, chunk.z).multiplyScalar(kChunkVoxels).addScalar(0.5).multiplyScalar(this.voxel);
-      mesh.updateMatrixWorld(true);
-    }
+  place(mesh, corner) {
+    mesh.scale.setScalar(this.voxel / kSteps);
+    mesh.position.set(...corner).multiplyScalar(kChunkVoxels).addScalar(0.5).multiplyScalar(this.voxel);
+    mesh.updateMatrixWorld(true);
   }
 
   centre(chunk) {
@@ -287,9 +250,8 @@ export class Surface {
       if (chunk.wanted && !set.has(chunk)) {
         this.tileCount -= chunk.tiles.size;
         chunk.tiles.clear();
-        chunk.done = chunk.dirty = false;
-        chunk.wanted = false;
-        this.show(chunk, "fine", null);
+        chunk.done = false;
+        this.changed.add(chunk);
       }
       chunk.wanted = set.has(chunk);
     }
@@ -300,43 +262,72 @@ export class Surface {
     this.wish(list);
   }
 
-  /** Called before each frame; true when something has changed. */
+  /** Called again and again until `drawn`, before each frame; true when something has changed, and a frame is wanted. */
   update(eye, reach) {
     this.uniforms.eye.value.copy(eye);
     this.uniforms.reach.value = reach;
-    let rebuilt = 0;
-    const start = performance.now();
-    for (const chunk of this.chunks.values()) {
-      // One that is shown coarsely waits until all of its tiles are there.
-      if (!chunk.dirty || (chunk.coarse && !chunk.done && !chunk.fine)) continue;
-      if (performance.now() - start > kRebuilding) break;
-      chunk.dirty = false;
-      ++rebuilt;
-      const parts = [...chunk.tiles.values()];
-      this.show(chunk, "fine", parts.length > 0 ? this.merged(parts) : null);
+    let different = false;
+    if (this.changed.size === 0) return false;
+    const start = performance.now(), next = [];
+    for (const chunk of this.changed) for (const part of chunk.chosen) if (!chunk.shown.has(part)) next.push([chunk, part.surface]);
+    this.buffers.expect(next);
+    for (const chunk of this.changed) {
+      if (this.buffers.waiting >= kWriting || performance.now() - start > kPreparing) break;
+      this.changed.delete(chunk);
+      different = this.draw(chunk) || different;
     }
-    for (const chunk of this.chunks.values()) this.choose(chunk);
-    return rebuilt > 0;
+    return different;
   }
+
+  /** A frame was drawn; true when it shows something else than the one before. */
+  drawn() { return this.buffers.drawn(); }
 
   /** Bounds of what is there; null when there is nothing. */
   bounds() {
     const box = new THREE.Box3();
     for (const chunk of this.chunks.values()) {
-      for (const mesh of [chunk.coarse, chunk.fine]) {
-        if (!mesh) continue;
-        box.union(mesh.geometry.boundingBox.clone().applyMatrix4(mesh.matrixWorld));
-      }
+      for (const part of chunk.coarse ? [chunk.coarse] : chunk.tiles.values()) box.union(this.boxOf(chunk, part));
     }
     return box.isEmpty() ? null : box;
   }
 
+  boxOf(chunk, part) {
+    if (!part.extent) {
+      const words = new Uint16Array(part.surface.bytes.buffer), low = [65535, 65535, 65535], high = [0, 0, 0];
+      for (let w = 0; w < words.length; w += 6) {
+        for (let i = 0; i < 3; ++i) {
+          if (words[w + i] < low[i]) low[i] = words[w + i];
+          if (words[w + i] > high[i]) high[i] = words[w + i];
+        }
+      }
+      part.extent = { low, high };
+    }
+    const metres = (corner) => new THREE.Vector3(...corner.map((v, i) => this.metres(chunk, part, v, i)));
+    return new THREE.Box3(metres(part.extent.low), metres(part.extent.high));
+  }
+
+  /** A vertex' coordinate along an axis [m]. */
+  metres(chunk, part, value, axis) {
+    return this.voxel * ([chunk.x, chunk.y, chunk.z][axis] * kChunkVoxels + 0.5 + (value + part.offset[axis]) / kSteps);
+  }
+
   /** The first point of the surface, below the cut, that the ray meets; null when there is none. */
-  hit(raycaster) {
-    const meshes = this.group.children.filter((mesh) => mesh.visible);
-    const cut = this.uniforms.cut.value;
-    const found = raycaster.intersectObjects(meshes).find((one) => one.point.z <= cut);
-    return found ? found.point : null;
+  hit({ ray }) {
+    const cut = this.uniforms.cut.value, points = [0, 1, 2].map(() => new THREE.Vector3()), found = new THREE.Vector3();
+    let nearest = Infinity, best = null;
+    for (const chunk of this.chunks.values()) {
+      for (const part of chunk.shown.keys()) {
+        if (!ray.intersectsBox(this.boxOf(chunk, part))) continue;
+        const words = new Uint16Array(part.surface.bytes.buffer), { index } = part.surface;
+        for (let i = 0; i < index.length; i += 3) {
+          points.forEach((point, k) => point.set(...[0, 1, 2].map((axis) => this.metres(chunk, part, words[6 * index[i + k] + axis], axis))));
+          if (!ray.intersectTriangle(...points, true, found) || found.z > cut) continue;
+          const far = found.distanceToSquared(ray.origin);
+          if (far < nearest) [nearest, best] = [far, found.clone()];
+        }
+      }
+    }
+    return best;
   }
 
   dim(share) { this.uniforms.dim.value = share; }

@@ -1,7 +1,7 @@
 // Numbers, times and reasons as people read them.
 
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.charCodeAt(0)};`);
-export const nameOf = (object) => `${object.class} #${object.number}`;
+export const nameOf = (object) => `${object.class.replaceAll("_", " ")} #${object.number}`;
 export const metres = (m) => m < 10 ? `${m.toFixed(2)} m` : `${m.toFixed(1)} m`;
 export const placeOf = (box) => `(${box[0].toFixed(2)}, ${box[1].toFixed(2)})`;
 export const score = (v) => v.toFixed(2);

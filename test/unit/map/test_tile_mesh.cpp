@@ -224,6 +224,32 @@ TEST(TileMesh, CoarserHasFewerTrianglesAtTheSamePlace) {
   EXPECT_LT(4 * coarse, fine);
 }
 
+// A ball and a bit of dust, each in the middle of the one cube of a tile: nothing of them would be
+// left.
+TEST(TileMesh, WhatIsSmallAndAloneIsStillThereCoarsely) {
+  for (const double radius_voxels : {1.2, 3.0, 6.0}) {
+    const TsdfConfig config = coarse_config();
+    const Eigen::Vector3d centre = Eigen::Vector3d::Constant(8.0 * config.voxel_size_m);
+    const auto tiles = tiles_of(config, [&](const Eigen::Vector3d& p) {
+      return (p - centre).norm() - radius_voxels * config.voxel_size_m;
+    });
+    const Decoded decoded(tiles, config.truncation_m());
+    const TileMesh mesh = extract_tile_mesh({0, 0, 0}, config.voxel_size_m, std::cref(decoded));
+    ASSERT_GT(mesh.triangles.size(), 0u);
+    const TileMesh few = coarsened(mesh, 16);
+    EXPECT_GT(few.triangles.size(), 0u) << radius_voxels;
+    EXPECT_LE(few.triangles.size(), 24u) << radius_voxels;
+    for (const auto& t : few.triangles) {
+      for (const std::uint32_t v : t) {
+        ASSERT_LT(v, few.vertices.size());
+        const Eigen::Vector3f from_centre =
+            few.vertices[v].position_voxels - Eigen::Vector3f::Constant(7.5f);
+        EXPECT_LT(from_centre.norm(), radius_voxels + 1.0);
+      }
+    }
+  }
+}
+
 // A floor over four tiles: the coarser surface has no gap between them.
 TEST(TileMesh, CoarserSurfacesOfNeighboursMeet) {
   const TsdfConfig config = coarse_config();

@@ -39,7 +39,9 @@ std::vector<TileKey> tiles_drawn_with(const TileKey& key);
 /// Coarser by vertex clustering (Rossignac and Borrel 1993): vertices in one cube of `cell_voxels`
 /// become their mean, and triangles with two corners in one cube go. Vertices on the sides of the
 /// tile keep to them, so that the coarser surfaces of neighbours meet without a gap. The owner is
-/// that of most of the vertices of a cube, of the lowest id where they are as many.
+/// that of most of the vertices of a cube, of the lowest id where they are as many. A surface of
+/// which nothing would be left, as it stands alone in its cubes, is done with cubes of half the
+/// side: no piece of the surface is gone as a whole.
 TileMesh coarsened(const TileMesh& mesh, int cell_voxels);
 
 }  // namespace pocd
