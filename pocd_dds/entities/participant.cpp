@@ -270,7 +270,13 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
     warn_of_profile(qos);
   }
   make_shared_memory_last(qos);
-  watch_transports(qos, impl_->discovery.calls());
+  const std::string unwatched = watch_transports(qos, impl_->discovery.calls());
+  if (!unwatched.empty()) {
+    log_warning(
+        "{}: the profile of the participant uses {}: when Fast DDS's discovery hangs (Fast-DDS "
+        "#6502), it is not noticed by what comes that way (docs/operating.md)",
+        options.name, unwatched);
+  }
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   if (discovery.leaseDuration ==
       DomainParticipantQos().wire_protocol().builtin.discovery_config.leaseDuration) {

@@ -79,6 +79,16 @@ class Tap : public DataReaderListener {
       take(info);
     }
   }
+  /// A late joiner gets nothing of a writer that has gone. (Of a keyed topic its instances go.)
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
+    if (!latched_ || instances_ || status.current_count_change >= 0) return;
+    recording::MessageHeader header;
+    header.channel = channel_;
+    LatchKey writer{};
+    const eprosima::fastrtps::rtps::octet* handle = status.last_publication_handle.value;
+    std::copy_n(handle, writer.size(), writer.begin());
+    queue_.push({header, {}, latch(writer, Latch::Part::kWriterGone)});
+  }
   void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
     counts_.lost += static_cast<std::uint64_t>(status.total_count_change);
   }
@@ -362,7 +372,9 @@ void Recorder::Impl::write_all() {
     while (!queue.finished()) {
       std::optional<QueuedSample> sample = queue.pop(std::chrono::milliseconds(100));
       const std::lock_guard<std::mutex> lock(writer_mutex);
-      if (sample) {
+      if (sample && !sample->is_message()) {
+        latched.note(*sample);
+      } else if (sample) {
         if (!converted.empty()) write_for_rerun(*sample);
         writer.write(sample->header, sample->payload.data(), sample->payload.size());
         latched.note(*sample);

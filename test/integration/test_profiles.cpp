@@ -151,6 +151,36 @@ TEST(Profiles, BuffersThatTheyLeaveSmallAreNamed) {
               "<receiveBufferSize>4194304</receiveBufferSize>"));
 }
 
+// By such transports a discovery that hangs would not be noticed.
+TEST(Profiles, TransportsThatAreNotWatchedAreNamed) {
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto said = [&](const std::string& type, const std::string& builtin) {
+    const auto file = folder.path() / "profiles.xml";
+    std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
+  <transport_descriptors><transport_descriptor><transport_id>own</transport_id><type>)"
+                        << type << R"(</type></transport_descriptor></transport_descriptors>
+  <participant profile_name="own" is_default_profile="true"><rtps>
+    <userTransports><transport_id>own</transport_id></userTransports>
+    <useBuiltinTransports>)"
+                        << builtin << R"(</useBuiltinTransports>
+  </rtps></participant></profiles></dds>)";
+    Process node(node_command(domain, {"--profiles", file.string()}));
+    EXPECT_TRUE(eventually([&] {
+      return node.err().find("running on domain") != std::string::npos;
+    })) << node.err();
+    const std::string before = "the profile of the participant uses ", text = node.err();
+    const std::size_t at = text.find(before);
+    if (at == std::string::npos) return std::string();
+    EXPECT_EQ(text.find(before, at + 1), std::string::npos) << "once: " << text;
+    return text.substr(at + before.size(), text.find(':', at) - at - before.size());
+  };
+  EXPECT_EQ(said("UDPv4", "false"), "");
+  EXPECT_EQ(said("UDPv4", "true"), "the transports of useBuiltinTransports");
+  EXPECT_EQ(said("TCPv4", "true"), "TCP, the transports of useBuiltinTransports");
+}
+
 TEST(SocketBuffers, SayWhatToSetWhenTheyAreSmall) {
   EXPECT_EQ(dds::socket_buffer_problem(4096), "");
   const std::string problem = dds::socket_buffer_problem(1 << 30);
