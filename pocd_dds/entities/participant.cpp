@@ -361,6 +361,9 @@ DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& 
     return qos;
   }
   apply(delivery, qos);
+  // As large as a sample is; preallocated, each of the ten of diagnostics would have 5 MB. (Readers
+  // of Fast DDS 2.9.1 refuse disposes without a payload then.)
+  qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
   // The default of 3 s is how long a lost last sample would stay lost. A writer that keeps all is
   // one whose sender waits for acknowledgements, which readers only give when a heartbeat asks.
   const double heartbeat_s = delivery.keep_last > 0 ? 0.1 : 0.005;

@@ -1,11 +1,13 @@
 // What an operator's XML profiles replace, and the check of the machine's socket buffers.
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fstream>
 
 #include "bus_harness.hpp"
+#include "diagnostic_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/socket_buffers.hpp"
@@ -120,6 +122,23 @@ TEST(Participant, ATopicGoesWithItsLastUser) {
   }
   EXPECT_NO_THROW(image());
   bus->publisher()->delete_datawriter(left);
+}
+
+// Preallocated, each of ten samples would have the largest size of its type, 5 MB.
+TEST(Participant, SamplesOfAWriterTakeNoMoreThanTheyNeed) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType> writer(bus,
+                                                                      dds::topics::kDiagnostics);
+  const auto in_use = [] {
+    const struct mallinfo2 info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  diagnostic_msgs::msg::DiagnosticArray sample;
+  writer.write(sample);
+  const std::size_t before = in_use();
+  for (int i = 0; i < 20; ++i) writer.write(sample);
+  EXPECT_LT(in_use(), before + (1u << 20));
 }
 
 // What says nothing of sizes has the kernel's: most images of a robot are lost then.
