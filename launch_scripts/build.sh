@@ -33,7 +33,7 @@ while [[ $# -gt 0 ]]; do
       esac
       base=(--build-base "build/$1" --install-base "install/$1")
       sanitizer=("-DCMAKE_CXX_FLAGS=$flags" "-DCMAKE_C_FLAGS=$flags" "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG"
-        -DPOCD_BENCHMARKS=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=6)
+        -DPOCD_BENCHMARKS=OFF)
       ;;
     --help | -h) usage && exit 0 ;;
     --) shift && break ;;
