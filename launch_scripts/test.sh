@@ -31,7 +31,7 @@ case "$sanitizer" in
   "") build_arguments+=(${werror:+"$werror"}) ;;
   thread)
     # Everything that has threads of its own.
-    programs=${programs:-pocd_node,pocd_play,pocd_mirror,pocd_health,pocd_doctor}
+    programs=${programs:-pocd_map,pocd_node,pocd_play,pocd_mirror,pocd_health,pocd_doctor}
     only=${only:-'^(unit_(common|mirror|node)|integration_(fleet|health|library_guards|many_robots|map_bus|mirror|node|two_nodes|type_versions))$'}
     ;;
   address) ;;
