@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
@@ -205,6 +206,8 @@ struct Participant::Impl {
   Publisher* publisher = nullptr;
   Subscriber* subscriber = nullptr;
   std::mutex mutex;
+  // The outermost lock: taken with no other of ours held, and by no listener.
+  std::mutex making_readers;
   struct UsedTopic {
     Topic* topic = nullptr;
     int users = 0;
@@ -384,6 +387,18 @@ DataReaderQos Participant::reader_qos(const std::string& topic, const Delivery& 
   }
   apply(delivery, qos);
   return qos;
+}
+
+DataReader* Participant::make_reader(Subscriber& subscriber, Topic& topic, const DataReaderQos& qos,
+                                     DataReaderListener& listener) {
+  const std::lock_guard<std::mutex> lock(impl_->making_readers);
+  return subscriber.create_datareader(&topic, qos, &listener);
+}
+
+void Participant::delete_reader(Subscriber& subscriber, DataReader& reader) {
+  reader.set_listener(nullptr);
+  const std::lock_guard<std::mutex> lock(impl_->making_readers);
+  subscriber.delete_datareader(&reader);
 }
 
 double Participant::still_s() const { return impl_->discovery.still_s(); }

@@ -184,7 +184,7 @@ struct Recorder::Impl {
                       const std::map<std::string, std::string>& metadata);
   void write_for_rerun(QueuedSample& sample);
   void open_reader(Line& line);
-  static void close_reader(Line& line);
+  void close_reader(Line& line);
   void close_readers();
   void write_all();
   void rethrow_failure();
@@ -332,7 +332,7 @@ void Recorder::Impl::open_reader(Line& line) {
     line.tap =
         std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key),
                               topic.transient_local && options.split.splits());
-    line.reader = line.subscriber->create_datareader(line.use.get(), qos, line.tap.get());
+    line.reader = participant->make_reader(*line.subscriber, *line.use, qos, *line.tap);
     if (line.reader == nullptr) throw InputError("cannot create a reader");
   } catch (const InputError& error) {
     spdlog::error("{}: is not recorded: {}", topic.name, error.what());
@@ -340,10 +340,7 @@ void Recorder::Impl::open_reader(Line& line) {
 }
 
 void Recorder::Impl::close_reader(Line& line) {
-  if (line.reader != nullptr) {
-    line.reader->set_listener(nullptr);
-    line.subscriber->delete_datareader(line.reader);
-  }
+  if (line.reader != nullptr) participant->delete_reader(*line.subscriber, *line.reader);
   if (line.subscriber != nullptr) {
     const_cast<DomainParticipant*>(line.subscriber->get_participant())
         ->delete_subscriber(line.subscriber);
