@@ -3,20 +3,22 @@
 # "N passed, N failed" (and ", N skipped"); the exit code is 0 only when tests ran and none failed.
 #
 # With --sanitize thread, the tests of the component's threads run under ThreadSanitizer; with --sanitize
-# address, all tests under AddressSanitizer and UndefinedBehaviorSanitizer. Only what --only selects is built.
+# address, all tests under AddressSanitizer and UndefinedBehaviorSanitizer. Only the tests that --only selects
+# are built, and only the programs that --programs names (thread: those of the tests that it runs without --only).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 build_arguments=(--tests)
 ctest_arguments=()
-sanitizer="" only="" werror=""
+sanitizer="" only="" werror="" programs=""
 while [[ $# -gt 0 ]]; do
   case "$1" in
     --werror) werror=--werror ;;
     --only) shift && only=${1:?--only needs a pattern} ;;
     --sanitize) shift && sanitizer=${1:?--sanitize needs thread or address} ;;
+    --programs) shift && programs=${1:?--programs needs a list of names with commas, or all} ;;
     *)
-      echo "usage: test.sh [--werror] [--only PATTERN] [--sanitize thread|address]" >&2
+      echo "usage: test.sh [--werror] [--only PATTERN] [--sanitize thread|address [--programs NAME,NAME...|all]]" >&2
       echo "  PATTERN: regular expression of names" >&2
       exit 2
       ;;
@@ -29,6 +31,7 @@ case "$sanitizer" in
   "") build_arguments+=(${werror:+"$werror"}) ;;
   thread)
     # Everything that has threads of its own.
+    programs=${programs:-pocd_map,pocd_node,pocd_play,pocd_mirror,pocd_health,pocd_doctor}
     only=${only:-'^(unit_(common|mirror|node)|integration_(fleet|health|library_guards|many_robots|map_bus|mirror|node|two_nodes|type_versions))$'}
     ;;
   address) ;;
@@ -38,7 +41,9 @@ esac
 if [[ -n "$sanitizer" ]]; then
   build=build/$sanitizer
   base=(--build-base "$build" --install-base "install/$sanitizer")
-  build_arguments+=(--sanitize "$sanitizer" -- "-DPOCD_TEST_SELECT=$only" -DPOCD_TEST_TIMEOUT=2400)
+  [[ "$programs" == all ]] && programs=""
+  build_arguments+=(--sanitize "$sanitizer" -- "-DPOCD_PROGRAMS=${programs//,/;}" "-DPOCD_TEST_SELECT=$only"
+    -DPOCD_TEST_TIMEOUT=2400)
   rules=$PWD/test/support/sanitizers
   # A report ends the process with an exit code that no test takes for success.
   export TSAN_OPTIONS="suppressions=$rules/thread.supp exitcode=66 second_deadlock_stack=1"

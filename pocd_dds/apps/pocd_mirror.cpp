@@ -6,6 +6,7 @@
 #include <map>
 
 #include "apps/common.hpp"
+#include "apps/heap_return.hpp"
 #include "pocd/map/birdseye.hpp"
 #include "pocd/map/mesh.hpp"
 #include "pocd/output/result_csv.hpp"
@@ -105,7 +106,9 @@ int follow(Options options) {
   const auto arrived = [&](const pocd::MirrorStatus& status) { return reached(options, status); };
   std::string last;
   bool done = false;
+  pocd::dds::HeapReturn heap;
   while (!done && !pocd::dds::stop_requested && !over()) {
+    heap.turn();
     done = mirror->wait_until(arrived, milliseconds(200));
     const pocd::MirrorStatus status = mirror->status();
     const std::string text = describe(status);

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "apps/common.hpp"
+#include "apps/heap_return.hpp"
 #include "apps/service_notice.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd_dds/node/node.hpp"
@@ -141,8 +142,10 @@ int main(int argc, char** argv) {
     pocd::dds::ServiceNotice service;
     const auto endpoint = metrics_at(metrics, options);
     const auto socket = socket_at(health_socket);
+    pocd::dds::HeapReturn heap;
     options.on_status = [&](const pocd::dds::NodeReport& report,
                             const pocd_msgs::msg::NodeHealth& health) {
+      heap.turn();
       service.tell(report);
       if (endpoint) endpoint->update(report);
       if (socket) {

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "apps/common.hpp"
+#include "apps/heap_return.hpp"
 #include "pocd_dds/recording/recorder.hpp"
 
 namespace {
@@ -116,7 +117,9 @@ int main(int argc, char** argv) {
     pocd::dds::Recorder recorder(options);
     spdlog::info("recording on domain {} into {}", options.bus.domain, options.output.string());
     StatusLine line(isatty(STDERR_FILENO) != 0);
+    pocd::dds::HeapReturn heap;
     while (!pocd::dds::stop_requested) {
+      heap.turn();
       recorder.step(std::chrono::milliseconds(100));
       line.update(recorder.status());
     }

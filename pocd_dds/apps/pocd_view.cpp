@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "apps/common.hpp"
+#include "apps/heap_return.hpp"
 #include "view/feed.hpp"
 #include "view/recorded.hpp"
 #include "view/remembered.hpp"
@@ -60,7 +61,11 @@ int serve(const Options& options) {
     spdlog::warn("everybody who reaches {} sees the map: --token asks for one",
                  options.server.address);
   }
-  while (!pocd::dds::stop_requested) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  pocd::dds::HeapReturn heap;
+  while (!pocd::dds::stop_requested) {
+    heap.turn();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
   return 0;
 }
 

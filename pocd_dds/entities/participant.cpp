@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
@@ -205,6 +206,8 @@ struct Participant::Impl {
   Publisher* publisher = nullptr;
   Subscriber* subscriber = nullptr;
   std::mutex mutex;
+  // The outermost lock: taken with no other of ours held, and by no listener.
+  std::mutex making_readers;
   struct UsedTopic {
     Topic* topic = nullptr;
     int users = 0;
@@ -270,7 +273,13 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
     warn_of_profile(qos);
   }
   make_shared_memory_last(qos);
-  watch_transports(qos, impl_->discovery.calls());
+  const std::string unwatched = watch_transports(qos, impl_->discovery.calls());
+  if (!unwatched.empty()) {
+    log_warning(
+        "{}: the profile of the participant uses {}: when Fast DDS's discovery hangs (Fast-DDS "
+        "#6502), it is not noticed by what comes that way (docs/operating.md)",
+        options.name, unwatched);
+  }
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   if (discovery.leaseDuration ==
       DomainParticipantQos().wire_protocol().builtin.discovery_config.leaseDuration) {
@@ -355,6 +364,9 @@ DataWriterQos Participant::writer_qos(const std::string& topic, const Delivery& 
     return qos;
   }
   apply(delivery, qos);
+  // As large as a sample is; preallocated, each of the ten of diagnostics would have 5 MB. (Readers
+  // of Fast DDS 2.9.1 refuse disposes without a payload then.)
+  qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
   // The default of 3 s is how long a lost last sample would stay lost. A writer that keeps all is
   // one whose sender waits for acknowledgements, which readers only give when a heartbeat asks.
   const double heartbeat_s = delivery.keep_last > 0 ? 0.1 : 0.005;
@@ -375,6 +387,18 @@ DataReaderQos Participant::reader_qos(const std::string& topic, const Delivery& 
   }
   apply(delivery, qos);
   return qos;
+}
+
+DataReader* Participant::make_reader(Subscriber& subscriber, Topic& topic, const DataReaderQos& qos,
+                                     DataReaderListener& listener) {
+  const std::lock_guard<std::mutex> lock(impl_->making_readers);
+  return subscriber.create_datareader(&topic, qos, &listener);
+}
+
+void Participant::delete_reader(Subscriber& subscriber, DataReader& reader) {
+  reader.set_listener(nullptr);
+  const std::lock_guard<std::mutex> lock(impl_->making_readers);
+  subscriber.delete_datareader(&reader);
 }
 
 double Participant::still_s() const { return impl_->discovery.still_s(); }

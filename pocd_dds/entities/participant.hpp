@@ -14,6 +14,11 @@
 
 #include "pocd_dds/entities/topic_table.hpp"
 
+namespace eprosima::fastdds::dds {
+class DataReader;
+class DataReaderListener;
+}  // namespace eprosima::fastdds::dds
+
 namespace pocd::dds {
 
 struct BusOptions {
@@ -69,6 +74,17 @@ class Participant {
                                                    const Delivery& delivery) const;
   eprosima::fastdds::dds::DataReaderQos reader_qos(const std::string& topic,
                                                    const Delivery& delivery) const;
+
+  /// Every reader of this participant is made and deleted here, one at a time: Fast DDS 2.9.1 keeps
+  /// them in a list that `WLP::remove_local_reader` changes without a lock. (It has one for
+  /// writers.) Not from a listener: both may wait for a callback that runs. Null when Fast DDS
+  /// makes none.
+  eprosima::fastdds::dds::DataReader* make_reader(
+      eprosima::fastdds::dds::Subscriber& subscriber, eprosima::fastdds::dds::Topic& topic,
+      const eprosima::fastdds::dds::DataReaderQos& qos,
+      eprosima::fastdds::dds::DataReaderListener& listener);
+  void delete_reader(eprosima::fastdds::dds::Subscriber& subscriber,
+                     eprosima::fastdds::dds::DataReader& reader);
 
   using Guid = EndpointGuid;
   /// When this reader or writer of another participant announces another version of its type than

@@ -86,7 +86,7 @@ RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& 
   DataReaderQos qos = owner.reader_qos(topic_, delivery);
   qos.user_data().data_vec(idl_announcement(spec.type));
   impl_->reliable = qos.reliability().kind == RELIABLE_RELIABILITY_QOS;
-  impl_->reader = owner.subscriber()->create_datareader(impl_->use.get(), qos, impl_.get());
+  impl_->reader = owner.make_reader(*owner.subscriber(), *impl_->use, qos, *impl_);
   if (impl_->reader == nullptr) throw InputError("cannot create a reader of topic " + topic_);
   impl_->guid = to_guid(impl_->reader->get_instance_handle());
   owner.joined(impl_->guid, {topic_, true});
@@ -94,8 +94,7 @@ RawReader::RawReader(std::shared_ptr<Participant> participant, const TopicSpec& 
 
 RawReader::~RawReader() {
   impl_->participant->left(impl_->guid);
-  impl_->reader->set_listener(nullptr);
-  impl_->participant->subscriber()->delete_datareader(impl_->reader);
+  impl_->participant->delete_reader(*impl_->participant->subscriber(), *impl_->reader);
 }
 
 int RawReader::matched() const { return impl_->matched; }

@@ -2,6 +2,7 @@
 
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
+#include <fastdds/rtps/transport/TCPTransportDescriptor.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/UDPv6TransportDescriptor.h>
 
@@ -80,13 +81,25 @@ bool watch(std::shared_ptr<rtps::TransportDescriptorInterface>& transport,
 
 }  // namespace
 
-void watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
-                      const std::shared_ptr<OpenCalls>& calls) {
+std::string watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
+                             const std::shared_ptr<OpenCalls>& calls) {
+  std::string unwatched;
+  const auto add = [&](const char* name) {
+    if (unwatched.find(name) == std::string::npos) {
+      unwatched += (unwatched.empty() ? "" : ", ") + std::string(name);
+    }
+  };
   for (auto& transport : qos.transport().user_transports) {
-    watch<LastingSharedMemory>(transport, calls) ||
+    if (watch<LastingSharedMemory>(transport, calls) ||
         watch<rtps::UDPv4TransportDescriptor>(transport, calls) ||
-        watch<rtps::UDPv6TransportDescriptor>(transport, calls);
+        watch<rtps::UDPv6TransportDescriptor>(transport, calls)) {
+      continue;
+    }
+    const bool tcp = dynamic_cast<const rtps::TCPTransportDescriptor*>(transport.get()) != nullptr;
+    add(tcp ? "TCP" : "a transport of another kind");
   }
+  if (qos.transport().use_builtin_transports) add("the transports of useBuiltinTransports");
+  return unwatched;
 }
 
 }  // namespace pocd::dds

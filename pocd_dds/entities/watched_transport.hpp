@@ -3,6 +3,7 @@
 
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <memory>
+#include <string>
 
 #include "pocd_dds/entities/open_calls.hpp"
 
@@ -13,8 +14,9 @@ namespace pocd::dds {
 /// (Fast-DDS #6502), a call does not return as soon as any other participant has said anything,
 /// which each does several times per lease. Costs two atomic writes per message.
 ///
-/// TCP, and what a profile's useBuiltinTransports adds to transports of its own, is not watched.
-void watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
+/// What is not watched, in words: other transports such as TCP, and those that a profile's
+/// useBuiltinTransports adds to its own. Empty: all is.
+std::string watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
                       const std::shared_ptr<OpenCalls>& calls);
 
 }  // namespace pocd::dds

@@ -13,15 +13,15 @@
 namespace pocd::dds {
 
 /// The last samples of latched topics: of a keyed one the newest of each instance, of another one
-/// what its writers would keep for a late joiner, as far as that can be told from outside. Not
-/// thread-safe.
+/// what the writers that are there would keep for a late joiner, as far as that can be told from
+/// outside. Not thread-safe.
 class LatchedSamples {
  public:
   void note(const QueuedSample& sample) {
     if (!sample.latch) return;
     const Latch& latch = *sample.latch;
     std::map<LatchKey, Kept>& sources = channels_[latch.channel];
-    if (latch.part == Latch::Part::kGone) {
+    if (latch.part == Latch::Part::kGone || latch.part == Latch::Part::kWriterGone) {
       sources.erase(latch.source);
       return;
     }

@@ -79,6 +79,16 @@ class Tap : public DataReaderListener {
       take(info);
     }
   }
+  /// A late joiner gets nothing of a writer that has gone. (Of a keyed topic its instances go.)
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
+    if (!latched_ || instances_ || status.current_count_change >= 0) return;
+    recording::MessageHeader header;
+    header.channel = channel_;
+    LatchKey writer{};
+    const eprosima::fastrtps::rtps::octet* handle = status.last_publication_handle.value;
+    std::copy_n(handle, writer.size(), writer.begin());
+    queue_.push({header, {}, latch(writer, Latch::Part::kWriterGone)});
+  }
   void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
     counts_.lost += static_cast<std::uint64_t>(status.total_count_change);
   }
@@ -174,7 +184,7 @@ struct Recorder::Impl {
                       const std::map<std::string, std::string>& metadata);
   void write_for_rerun(QueuedSample& sample);
   void open_reader(Line& line);
-  static void close_reader(Line& line);
+  void close_reader(Line& line);
   void close_readers();
   void write_all();
   void rethrow_failure();
@@ -322,7 +332,7 @@ void Recorder::Impl::open_reader(Line& line) {
     line.tap =
         std::make_unique<Tap>(queue, counts, line.channel, line.instances, static_cast<bool>(key),
                               topic.transient_local && options.split.splits());
-    line.reader = line.subscriber->create_datareader(line.use.get(), qos, line.tap.get());
+    line.reader = participant->make_reader(*line.subscriber, *line.use, qos, *line.tap);
     if (line.reader == nullptr) throw InputError("cannot create a reader");
   } catch (const InputError& error) {
     spdlog::error("{}: is not recorded: {}", topic.name, error.what());
@@ -330,10 +340,7 @@ void Recorder::Impl::open_reader(Line& line) {
 }
 
 void Recorder::Impl::close_reader(Line& line) {
-  if (line.reader != nullptr) {
-    line.reader->set_listener(nullptr);
-    line.subscriber->delete_datareader(line.reader);
-  }
+  if (line.reader != nullptr) participant->delete_reader(*line.subscriber, *line.reader);
   if (line.subscriber != nullptr) {
     const_cast<DomainParticipant*>(line.subscriber->get_participant())
         ->delete_subscriber(line.subscriber);
@@ -362,7 +369,9 @@ void Recorder::Impl::write_all() {
     while (!queue.finished()) {
       std::optional<QueuedSample> sample = queue.pop(std::chrono::milliseconds(100));
       const std::lock_guard<std::mutex> lock(writer_mutex);
-      if (sample) {
+      if (sample && !sample->is_message()) {
+        latched.note(*sample);
+      } else if (sample) {
         if (!converted.empty()) write_for_rerun(*sample);
         writer.write(sample->header, sample->payload.data(), sample->payload.size());
         latched.note(*sample);

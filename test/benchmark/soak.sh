@@ -3,9 +3,10 @@
 # node is restarted and killed. Two nodes, a mirror and a recorder are measured every ten seconds; the node, the
 # mirror and the recorder that are never restarted have to stay as large as they were. By hand, not a test.
 # usage: soak.sh BIN_DIR OUTPUT_DIR [MINUTES (60)]
-# Writes soak.csv, and soak.png where gnuplot is installed. Exit code: 0 all is flat, 1 something grew or failed.
+# Writes soak.csv, heap.csv (what of the node's and the recorder's heap is in use), and soak.png where gnuplot is
+# installed. Exit code: 0 all is flat, 1 something grew or failed, 3 void: Fast DDS's discovery hung (docs/operating.md).
 set -euo pipefail
-[[ $# -ge 2 ]] || { sed -n '2,6s/^# //p' "$0" >&2 && exit 2; }
+[[ $# -ge 2 ]] || { sed -n '2,7s/^# //p' "$0" >&2 && exit 2; }
 bin=$(realpath "$1") minutes=${3:-60}
 mkdir -p "$2"
 output=$(realpath "$2")
@@ -23,7 +24,7 @@ if [[ -z ${POCD_SOAK_ALONE:-} ]]; then
 fi
 export ROS_DOMAIN_ID=${ROS_DOMAIN_ID:-211}
 export FASTRTPS_DEFAULT_PROFILES_FILE=$PWD/launch_scripts/loopback.xml
-rm -rf "$output"/{soak.csv,log,memory,ring,mirror} && mkdir -p "$output"/{log,memory,ring}
+rm -rf "$output"/{soak.csv,heap.csv,log,memory,ring,mirror} && mkdir -p "$output"/{log,memory,ring}
 declare -A pids=()
 cleanup() { kill -KILL $(jobs -p) 2>/dev/null || true; }
 trap cleanup EXIT
@@ -34,13 +35,13 @@ start() { # NAME PROGRAM ARGUMENT...
   pids[$name]=$!
 }
 
-# Slow, small cameras: the machine is to be idle most of the time.
+# Slow, small cameras: the machine is to be idle most of the time, also when it does other work.
 scenario() { # ROBOT...: the small warehouse with these two robots
-  sed -e 's/^frame_rate_hz: .*/frame_rate_hz: 3/' -e "s/name: robot1/name: $1/" -e "s/name: robot2/name: $2/" \
+  sed -e 's/^frame_rate_hz: .*/frame_rate_hz: 2/' -e "s/name: robot1/name: $1/" -e "s/name: robot2/name: $2/" \
     -e 's/^sensor: .*/sensor: stereo\ncamera: {width: 320, height: 240, fx: 230, fy: 230, cx: 159.5, cy: 119.5}/' \
     config/sim/demo.yaml
 }
-for pair in 0 1 2 3; do scenario "robot$((2 * pair))" "robot$((2 * pair + 1))" >"$output/pair$pair.yaml"; done
+for pair in 0 1 2 3; do scenario "unit$((2 * pair))" "unit$((2 * pair + 1))" >"$output/pair$pair.yaml"; done
 scenario dock1 dock2 >"$output/dock.yaml"
 
 port=$((20000 + RANDOM % 20000))
@@ -71,6 +72,11 @@ sample() {
     metric pocd_objects "$text"),$(metric pocd_robots "$text"),$(ls /dev/shm | wc -l),$(
     du -sk /dev/shm | cut -f1),$(du -sk "$output/ring" | cut -f1),$(du -sk "$output/memory/node" | cut -f1)"
 }
+heap() { # what is in use and what is free between it, from time to time: it is read as a whole
+  echo "$SECONDS $(python3 test/benchmark/heap_use.py "${pids[node]}" 2>/dev/null) $(
+    python3 test/benchmark/heap_use.py "${pids[recorder]}" 2>/dev/null)" | tr ' ' ,
+}
+echo "seconds,node_used_kb,node_free_kb,recorder_used_kb,recorder_free_kb" >"$output/heap.csv"
 columns=seconds
 for process in node mirror recorder dock; do columns+=",${process}_kb,${process}_threads,${process}_fds"; done
 echo "$columns,queue,map_waiting,frames,dropped,objects,robots,shm_files,shm_kb,ring_kb,memory_kb" >"$output/soak.csv"
@@ -80,8 +86,15 @@ fail() {
   echo "soak: after $SECONDS s: $*" >&2
   exit 1
 }
+hung() { # no growth and no fault of ours can be seen any more
+  [[ $(metric pocd_discovery_stalls_total "$(curl -s -m 5 "http://127.0.0.1:$port/metrics")") == [1-9]* ]] ||
+    grep -q "discovery has not ended a turn" "$output"/log/{node,mirror,recorder} || return 0
+  echo "soak: after $SECONDS s: void: Fast DDS's discovery hangs (Fast-DDS #6502): $(
+    grep -h "discovery has not ended a turn" "$output"/log/{node,mirror,recorder} | head -n 1)" >&2
+  exit 3
+}
 SECONDS=0
-round=0 still=0 frames=""
+round=0 moved=0 frames=""
 until ((SECONDS >= 60 * minutes)); do
   # Every ten seconds something happens; what, the number of the round decides, so that two runs are alike.
   pair=$((round / 4 % 4))
@@ -89,29 +102,31 @@ until ((SECONDS >= 60 * minutes)); do
     # Not beside themselves: on a machine with much to do they would become more and more.
     [[ -n ${pids[pair$pair]:-} ]] && alive "pair$pair" ||
       start "pair$pair" pocd_play --dataset sim --input "$output/pair$pair.yaml" --no-color
-    [[ -n ${pids[dock_robots]:-} ]] && alive dock_robots ||
-      start dock_robots pocd_play --dataset sim --input "$output/dock.yaml" --no-color --max-frames 200
+    ((round % 8)) || { [[ -n ${pids[dock_robots]:-} ]] && alive dock_robots ||
+      start dock_robots pocd_play --dataset sim --input "$output/dock.yaml" --no-color --max-frames 200; }
   fi
   ((round % 12 == 3)) && kill -KILL "${pids[pair$pair]}" 2>/dev/null || true
-  if ((round % 3 == 0)); then # subscribers: for twenty seconds, every other one is killed
-    if ((round % 2)); then
+  if ((round % 6 == 0)); then # subscribers: for twenty seconds, every other one is killed
+    if ((round / 6 % 2)); then
       timeout --signal KILL 12 "$bin/pocd_mirror" --timeout 20 >>"$output/log/visitors" 2>&1 &
     else
       "$bin/pocd_mirror" --timeout 20 >>"$output/log/visitors" 2>&1 &
     fi
   fi
-  ((round % 5 == 0)) && { "$bin/pocd_health" --timeout 10 >>"$output/log/health" 2>&1 || true; }
-  if ((round % 18 == 17)); then # the other node: stopped in order, and killed
-    kill "-$(((round / 18) % 2 ? 9 : 15))" "${pids[dock]}" && { wait "${pids[dock]}" 2>/dev/null || true; }
+  ((round % 10 == 0)) && { "$bin/pocd_health" --timeout 10 >>"$output/log/health" 2>&1 || true; }
+  if ((round % 30 == 29)); then # the other node: stopped in order, and killed
+    kill "-$(((round / 30) % 2 ? 9 : 15))" "${pids[dock]}" && { wait "${pids[dock]}" 2>/dev/null || true; }
     dock
   fi
   sample >>"$output/soak.csv"
   for name in node mirror recorder; do alive "$name" || fail "$name has ended: $(tail -n 2 "$output/log/$name")"; done
+  hung
+  ((round % 12)) || heap >>"$output/heap.csv"
   # A node that hears nobody any more is flat, too.
   now=$(tail -n 1 "$output/soak.csv" | cut -d, -f16)
-  [[ $now == "$frames" ]] && still=$((still + 1)) || still=0
+  [[ $now == "$frames" ]] || moved=$SECONDS
   frames=$now
-  ((still < 18)) || fail "the node has processed no frame for three minutes, of robots that come and go"
+  ((SECONDS - moved < 180)) || fail "the node has processed no frame for three minutes, of robots that come and go"
   round=$((round + 1))
   while ((SECONDS < 10 * round)); do sleep 1; done
 done

@@ -1,11 +1,13 @@
 // What an operator's XML profiles replace, and the check of the machine's socket buffers.
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fstream>
 
 #include "bus_harness.hpp"
+#include "diagnostic_msgsPubSubTypes.h"
 #include "nav_msgsPubSubTypes.h"
 #include "pocd/common/check.hpp"
 #include "pocd_dds/entities/socket_buffers.hpp"
@@ -122,6 +124,23 @@ TEST(Participant, ATopicGoesWithItsLastUser) {
   bus->publisher()->delete_datawriter(left);
 }
 
+// Preallocated, each of ten samples would have the largest size of its type, 5 MB.
+TEST(Participant, SamplesOfAWriterTakeNoMoreThanTheyNeed) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType> writer(bus,
+                                                                      dds::topics::kDiagnostics);
+  const auto in_use = [] {
+    const struct mallinfo2 info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  diagnostic_msgs::msg::DiagnosticArray sample;
+  writer.write(sample);
+  const std::size_t before = in_use();
+  for (int i = 0; i < 20; ++i) writer.write(sample);
+  EXPECT_LT(in_use(), before + (1u << 20));
+}
+
 // What says nothing of sizes has the kernel's: most images of a robot are lost then.
 TEST(Profiles, BuffersThatTheyLeaveSmallAreNamed) {
   const TestDomain domain;
@@ -149,6 +168,36 @@ TEST(Profiles, BuffersThatTheyLeaveSmallAreNamed) {
   EXPECT_FALSE(
       says_so("<sendBufferSize>4194304</sendBufferSize>"
               "<receiveBufferSize>4194304</receiveBufferSize>"));
+}
+
+// By such transports a discovery that hangs would not be noticed.
+TEST(Profiles, TransportsThatAreNotWatchedAreNamed) {
+  const TestDomain domain;
+  const TemporaryFolder folder;
+  const auto said = [&](const std::string& type, const std::string& builtin) {
+    const auto file = folder.path() / "profiles.xml";
+    std::ofstream(file) << R"(<?xml version="1.0" encoding="UTF-8" ?>
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
+  <transport_descriptors><transport_descriptor><transport_id>own</transport_id><type>)"
+                        << type << R"(</type></transport_descriptor></transport_descriptors>
+  <participant profile_name="own" is_default_profile="true"><rtps>
+    <userTransports><transport_id>own</transport_id></userTransports>
+    <useBuiltinTransports>)"
+                        << builtin << R"(</useBuiltinTransports>
+  </rtps></participant></profiles></dds>)";
+    Process node(node_command(domain, {"--profiles", file.string()}));
+    EXPECT_TRUE(eventually([&] {
+      return node.err().find("running on domain") != std::string::npos;
+    })) << node.err();
+    const std::string before = "the profile of the participant uses ", text = node.err();
+    const std::size_t at = text.find(before);
+    if (at == std::string::npos) return std::string();
+    EXPECT_EQ(text.find(before, at + 1), std::string::npos) << "once: " << text;
+    return text.substr(at + before.size(), text.find(':', at) - at - before.size());
+  };
+  EXPECT_EQ(said("UDPv4", "false"), "");
+  EXPECT_EQ(said("UDPv4", "true"), "the transports of useBuiltinTransports");
+  EXPECT_EQ(said("TCPv4", "true"), "TCP, the transports of useBuiltinTransports");
 }
 
 TEST(SocketBuffers, SayWhatToSetWhenTheyAreSmall) {

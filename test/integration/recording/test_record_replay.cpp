@@ -1,6 +1,7 @@
 // What was recorded comes back as it was: payloads, quality of service, disposes, and the map.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 
 #include "bus_processes.hpp"
@@ -32,15 +33,19 @@ std::string scenario() {
   return std::string(POCD_SOURCE_DIR) + "/test/integration/recording/small_run.yaml";
 }
 
-/// The simulated run as the bus carries it.
-void record_simulation(const fs::path& file, const std::vector<std::string>& more = {}) {
-  Process recorder({command("pocd_record"), "--output", file.string()});
-  ASSERT_TRUE(says(recorder, "recording on domain"));
+void play_simulation(const std::vector<std::string>& more) {
   std::vector<std::string> play{command("pocd_play"), "--dataset", "sim",        "--input",
                                 scenario(),           "--fast",    "--lossless", "--no-color"};
   play.insert(play.end(), more.begin(), more.end());
   const CommandResult played = run_command(play);
   ASSERT_EQ(played.exit_code, 0) << played.err;
+}
+
+/// The simulated run as the bus carries it.
+void record_simulation(const fs::path& file, const std::vector<std::string>& more = {}) {
+  Process recorder({command("pocd_record"), "--output", file.string()});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  play_simulation(more);
   const CommandResult recorded = stop(recorder);
   EXPECT_NE(recorded.out.find(" 0 dropped, 0 lost"), std::string::npos) << recorded.out;
 }
@@ -143,6 +148,25 @@ TEST(RecordReplay, EveryFileOfASplitHasTheLatchedSamples) {
   stop(third);
   EXPECT_EQ(payloads(folder / "run_0000.mcap").count("/tf_static"), 0u) << "nobody sent";
   EXPECT_FALSE(fs::exists(folder / "run_0001.mcap")) << "of the recording that was replaced";
+}
+
+// A recorder that runs for months would keep, and write into each file, what all robots ever said.
+TEST(RecordReplay, AFileHasNothingLatchedOfWritersThatHadGone) {
+  const Folder folder;
+  const std::vector<std::string> visit{"--max-frames", "20"};
+  record_simulation(folder / "one_visit.mcap", visit);
+  const std::size_t of_one = payloads(folder / "one_visit.mcap").at("/tf_static").size();
+  fs::create_directory(folder / "split");
+  Process recorder({command("pocd_record"), "--output", (folder / "split" / "run.mcap").string(),
+                    "--split-size", "0.1"});
+  ASSERT_TRUE(says(recorder, "recording on domain"));
+  for (int i = 0; i < 3; ++i) play_simulation(visit);
+  stop(recorder);
+  fs::path last;
+  for (const auto& entry : fs::directory_iterator(folder / "split")) {
+    if (entry.path().extension() == ".mcap") last = std::max(last, entry.path());
+  }
+  EXPECT_LE(payloads(last).at("/tf_static").size(), of_one) << last;
 }
 
 /// Topics of a type that nothing here was built with.

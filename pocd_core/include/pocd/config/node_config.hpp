@@ -154,8 +154,8 @@ struct NodeConfig : InputConfig {
     visit("health_window_s", health_window_s, Range{0.1, 3600.0},
           "How long something that went wrong counts for the level of pocd/health [s].");
     visit("stall_s", stall_s, Range{0.1, 3600.0},
-          "A thread of the node that has not ended a turn for so long hangs: level 2, and not "
-          "ready [s].");
+          "A thread of the node, or Fast DDS's discovery, that has not ended a turn for so long "
+          "hangs: level 2, and not ready [s].");
   }
 };
 
