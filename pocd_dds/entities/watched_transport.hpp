@@ -17,6 +17,6 @@ namespace pocd::dds {
 /// What is not watched, in words: other transports such as TCP, and those that a profile's
 /// useBuiltinTransports adds to its own. Empty: all is.
 std::string watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
-                      const std::shared_ptr<OpenCalls>& calls);
+                             const std::shared_ptr<OpenCalls>& calls);
 
 }  // namespace pocd::dds

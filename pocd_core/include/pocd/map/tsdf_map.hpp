@@ -84,8 +84,8 @@ class TsdfMap {
   /// memory, as all are without a budget: MapReader finds those on disk.
   const VoxelBlock* find(const BlockKey& key) const;
   /// Signed distance [m] of the voxel that holds the point, positive in front of a surface; nothing
-  /// where fewer than `min_weight` looks measured it, or once the pending edits are made. Brings its
-  /// region back to memory: what is on disk must not change what follows.
+  /// where fewer than `min_weight` looks measured it, or once the pending edits are made. Brings
+  /// its region back to memory: what is on disk must not change what follows.
   std::optional<double> distance_at(const Eigen::Vector3f& point_W, int min_weight,
                                     const MapEdits& pending = {});
   /// For tests and loading: the block at key, allocated when missing; marked dirty.
