@@ -17,8 +17,8 @@ class MapEdits {
   /// Whether a voxel with its centre there [m, W] is meant.
   using Where = std::function<bool(const Eigen::Vector3d&)>;
 
-  /// The object's voxels become unknown: those that `where` accepts, or all. `where` is called by
-  /// apply_to().
+  /// The object's voxels become unknown: those that `where` accepts, or all. clears() and
+  /// apply_to() call `where`: what it refers to must last until then.
   void clear(ObjectId id, Where where = {});
   /// Voxels of `from` become voxels of `to`.
   void reassign(ObjectId from, ObjectId to);
