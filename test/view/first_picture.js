@@ -45,7 +45,7 @@ async function open() {
   };
   const { objects, chunks, tiles, triangles, bytes } = all.at(-1);
   const row = (name, value) => console.log(`| ${name} | ${value} |`);
-  row(`a page in Chromium that draws without a graphics card, ${all.length} times: first picture`, `${range(all.map((one) => one.first / 1000), 1)} s`);
+  row(`a page in Chromium that draws without a graphics card, ${all.length} times: first picture`, `${range(all.map((one) => one.first / 1000), 1)} s, with ${range(all.map((one) => one.firstTriangles), 0)} triangles of the map`);
   row("all of the map", `${range(all.map((one) => one.whole / 1000), 1)} s: ${objects} objects, ${chunks} chunks, ${tiles} fine tiles, ${triangles} triangles, ${(bytes / 1e6).toFixed(1)} MB`);
   row("CPU of the browser for that", `${range(all.map((one) => one.spent), 1)} s`);
 })();

@@ -25,6 +25,12 @@ main(async () => {
     page.on("pageerror", (error) => errors.push(String(error)));
     page.on("request", (request) => { if (!request.url().startsWith(server.address) && !/^(data|blob):/.test(request.url())) elsewhere.push(request.url()); });
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "dark" }]);
+    await page.evaluateOnNewDocument(() => {  // when the bars were taken away, and when they came
+      new MutationObserver(() => {
+        if (document.documentElement.classList.contains("starting")) window.started ??= performance.now();
+        else if (window.started) window.barsAt ??= performance.now();
+      }).observe(document, { attributes: true, subtree: true, attributeFilter: ["class"] });
+    });
     await page.goto(server.address);
     return page;
   };
@@ -55,6 +61,7 @@ main(async () => {
   }, pictures);
 
   await until(async () => (await state()) === "no map yet", "a page without a map says so");
+  await holds("without a map the bars are there, too", () => ["#bar", "#panel", "#time"].every((bar) => getComputedStyle(document.querySelector(bar)).visibility === "visible"));
   await shot("waiting");
 
   const buffers = await page.evaluate(checkBuffers);
@@ -227,7 +234,10 @@ main(async () => {
   await page.keyboard.press("d");
 
   const phone = await open(390, 844, { isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
-  await until(() => phone.evaluate(() => window.pocd.surface.tileCount > 20), "a phone gets the map");
+  await until(() => phone.evaluate(() => window.pocd.surface.tileCount > 20 && window.pocd.times.first !== null), "a phone gets the map");
+  const start = await phone.evaluate(() => ({ ...window.pocd.times, hidden: window.started, shown: window.barsAt, bar: getComputedStyle(document.querySelector("#bar")).visibility }));
+  check(start.bar === "visible" && start.hidden < start.first && (start.shown >= start.first || start.shown - start.hidden > 950), `the bars come with the first picture: ${JSON.stringify(start)}`);
+  check(start.firstTriangles > 0, "the first picture has some of the map");
   check(await phone.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing sticks out on a phone");
   await shot("phone", phone);
   await phone.close();

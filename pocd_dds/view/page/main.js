@@ -1,44 +1,50 @@
 // The page: what comes in is put in its place, what a person does is carried out.
 import * as THREE from "./three/build/three.module.js";
-import { colourOfScore, rgbOf, themes } from "./colours.js";
+import { changesBetween } from "./changes.js";
+import { colourOfScore, themes } from "./colours.js";
 import { Connection } from "./connection.js";
+import { Grid } from "./grid.js";
 import { Health } from "./health.js";
 import { helpHtml, keyTable } from "./help.js";
 import { Labels } from "./labels.js";
-import { Lines } from "./lines.js";
+import { Link, readLink, whenKnown } from "./link.js";
 import { ObjectLayer, ObjectStore } from "./objects.js";
 import { Panel } from "./panel.js";
 import { Robots } from "./robots.js";
 import { Stage } from "./stage.js";
+import { Start } from "./start.js";
 import { Surface } from "./surface.js";
+import { Tape } from "./tape.js";
 import { TimeLine } from "./timeline.js";
-import { metres, timeText } from "./words.js";
+import { timeText } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
 let theme = themes.dark;
-let selected = null, following = null, measuring = null, fitted = false, wantsFit = true;
+let selected = null, following = null, fitted = false, wantsFit = true;
 let then = null;      // objects and robots of another time: {stamp, map, objects, robots}
 let before = null;    // those of the marker "since", for the left half
 let other = null;     // the map of then for the left half: {connection, surface}
 let drawn = false, cut = Infinity, restored = false;
-
-// When the first picture with a map was there, when the last one with a new surface, and when that surface came [ms].
-const times = { first: null, whole: null, last: null };
 
 const connection = new Connection(use, (link) => health.setLink(link));
 const stage = new Stage();
 const store = new ObjectStore();
 const health = new Health();
 const surface = new Surface(stage.scene, (list) => connection.wish("want", list));
+const { times } = new Start(stage, surface);
 const layers = { now: new ObjectLayer(stage.scene), before: new ObjectLayer(stage.scene) };
 layers.before.group.visible = false;
 const robots = new Robots(stage.scene);
-const grid = new Lines(stage.scene);
-const tape = new Lines(stage.scene, true);
+const grid = new Grid(stage.scene);
+const tape = new Tape(stage.scene);
 const labels = new Labels($("labels"), stage);
 const panel = new Panel(store, { select, flyTo, inView });
 panel.wanted = askHistory;
 const time = new TimeLine(panel.events, timeChanged);
+const link = new Link(() => [
+  ["c", [...stage.camera.position.toArray(), ...stage.controls.target.toArray()].map((v) => v.toFixed(2)).join(",")],
+  ["sel", selected], ["t", time.at?.toFixed(3)], ["since", time.since?.toFixed(3)], ["split", stage.split ? 1 : null], ["top", stage.top ? 1 : null],
+]);
 
 function use(piece) {
   if (piece.kind !== "json") {
@@ -125,7 +131,7 @@ function select(id) {
   if (id) connection.send({ history: id });
   if (id && $("panel").classList.contains("low")) $("panel").className = "";
   drawn = false;
-  saveLink();
+  link.save();
 }
 
 function flyTo(box) {
@@ -178,24 +184,9 @@ function setSplit(on) {
   }
 }
 
-/** The last event of each object that has changed between the marker and the time that is shown. */
-function changesShown() {
-  const since = time.sinceStamp(), until = time.shown(), last = new Map();
-  for (const event of panel.events.values()) {
-    if (event.kind === "UPDATED" || event.stamp < since || event.stamp > until) continue;
-    if (event.kind === "OPERATOR") { last.delete(event.id); continue; }
-    const first = last.get(event.id);
-    if (event.kind === "REMOVED" && first?.kind === "ADDED") last.delete(event.id);
-    else if (event.kind === "MOVED" && first?.kind === "ADDED") last.set(event.id, { ...event, kind: "ADDED" });
-    else if (event.kind === "MOVED" && first?.kind === "MOVED") last.set(event.id, { ...event, previous: first.previous });
-    else last.set(event.id, event);
-  }
-  return [...last.values()];
-}
-
 function drawObjects(now) {
   panel.since = time.sinceStamp();
-  const changes = changesShown();
+  const changes = changesBetween(panel.events.values(), panel.since, time.shown());
   const live = store.list(now);
   const objects = then ? then.objects.map((object) => ({ ...object, condition: "present" })) : live;
   layers.now.draw(objects, changes, theme, selected);
@@ -219,7 +210,7 @@ function drawObjects(now) {
 function pose(json) { return [json.position[0], json.position[1], json.position[2]]; }
 
 stage.resizers.push((width, height, pixels) => {
-  for (const one of [layers.now, layers.before, robots.lines, grid, tape]) one.resize(width, height, pixels);
+  for (const one of [layers.now, layers.before, robots.lines, grid.lines, tape.lines]) one.resize(width, height, pixels);
 });
 stage.before.push((now) => {
   if (!fitted && times.last) adapt();
@@ -251,23 +242,16 @@ stage.halves.push((part) => {
     other.surface.group.visible = part === "left";
   }
 });
-const rightLabels = () => layers.now.labels.concat(robots.labels, tapeLabels());
+const rightLabels = () => layers.now.labels.concat(robots.labels, tape.labels);
 stage.after.push(() => {
   const placed = stage.split ? [{ labels: layers.before.labels, offset: 0 }, { labels: rightLabels(), offset: stage.partWidth }]
     : [{ labels: rightLabels(), offset: 0 }];
   labels.place(placed, selected);
 });
 
-let showsNew = false;  // the frame that is under way shows a surface that the one before did not
 stage.after.push(() => {
-  showsNew = surface.drawn();
   other?.surface.drawn();
   if (surface.changed.size > 0 || other?.surface.changed.size > 0) stage.askSoon();
-});
-stage.finished.push(() => {
-  if (!showsNew) return;
-  times.whole = performance.now();
-  times.first ??= times.whole;
 });
 
 /** Bounds of the map and its objects; null when there is no map. Objects come first: with them the first picture is of all. */
@@ -283,7 +267,7 @@ function adapt() {
   $("empty").hidden = Boolean(bounds) || store.objects.size > 0;
   health.show();
   if (!bounds) return;
-  drawGrid(bounds);
+  if (grid.draw(bounds, theme)) stage.ask();
   if ((wantsFit && !stage.touched && !restored) && !(fitted && fitted.containsBox(bounds))) {
     stage.fit(bounds, !fitted || stage.software);
     fitted = bounds.clone().expandByScalar(0.3);
@@ -298,23 +282,6 @@ function adapt() {
   }
 }
 setInterval(adapt, 250);  // to where the camera is
-
-/** Metres on the ground: every one of a room, every ten of a hall. */
-let gridded = "";
-function drawGrid(bounds) {
-  const step = Math.max(bounds.max.x - bounds.min.x, bounds.max.y - bounds.min.y) > 60 ? 10 : 1;
-  const [x0, y0] = [bounds.min.x, bounds.min.y].map((v) => step * Math.floor(v / step));
-  const [x1, y1] = [bounds.max.x, bounds.max.y].map((v) => step * Math.ceil(v / step));
-  const wanted = `${x0},${y0},${x1},${y1},${theme.grid}`;
-  if (wanted === gridded) return;
-  gridded = wanted;
-  grid.begin();
-  const rgb = rgbOf(theme.grid);
-  for (let x = x0; x <= x1; x += step) grid.add([x, y0, 0], [x, y1, 0], rgb, x % (5 * step) === 0 ? 1.6 : 1, 0.8);
-  for (let y = y0; y <= y1; y += step) grid.add([x0, y, 0], [x1, y, 0], rgb, y % (5 * step) === 0 ? 1.6 : 1, 0.8);
-  grid.end();
-  stage.ask();
-}
 
 function setTheme(name) {
   theme = themes[name];
@@ -355,9 +322,9 @@ const actions = {
     robots.dirty = true;
   },
   measure() {
-    measuring = measuring ? null : [];
-    press("tool-measure", Boolean(measuring));
-    hint(measuring ? "Click two points on the surface" : "");
+    tape.toggle();
+    press("tool-measure", tape.inUse);
+    hint(tape.inUse ? "Click two points on the surface" : "");
     drawTape();
   },
   split() {
@@ -368,7 +335,7 @@ const actions = {
   },
   theme() { setTheme(theme === themes.dark ? "light" : "dark"); },
   async link() {
-    saveLink(true);
+    link.save(true);
     try {
       await navigator.clipboard.writeText(location.href);
       hint("The link to this view was copied");
@@ -388,7 +355,7 @@ const actions = {
   play() { time.toggle(); },
   live() { time.live(); },
   escape() {
-    if (measuring) actions.measure();
+    if (tape.inUse) actions.measure();
     else if (selected) select(null);
     else if (following) {
       following = null;
@@ -406,18 +373,7 @@ addEventListener("keydown", (key) => {
   if (key.key === " " && key.target.matches("button, summary, input")) return;
   key.preventDefault();
   if (bound.action) return actions[bound.action]();
-  const target = stage.controls.target, reach = stage.camera.position.distanceTo(target);
-  const ahead = target.clone().sub(stage.camera.position).setZ(0);
-  if (ahead.lengthSq() < 1e-6) ahead.set(0, 1, 0);
-  ahead.normalize().multiplyScalar(0.12 * reach);
-  const by = { ArrowUp: ahead, ArrowDown: ahead.clone().negate(), ArrowLeft: new THREE.Vector3(-ahead.y, ahead.x, 0), ArrowRight: new THREE.Vector3(ahead.y, -ahead.x, 0) }[key.key];
-  if (by) {
-    stage.follow([0, 0], [by.x, by.y]);
-  } else {
-    const zoom = key.key === "+" || key.key === "=" ? 0.8 : 1.25;
-    stage.camera.position.sub(target).multiplyScalar(zoom).add(target);
-    stage.controls.update();
-  }
+  stage.step(key.key);
   stage.touched = true;
 });
 
@@ -431,10 +387,9 @@ $("canvas").addEventListener("pointerup", (up) => {
   if (!pressedAt || Math.hypot(up.clientX - pressedAt[0], up.clientY - pressedAt[1]) > 6) return;
   const { raycaster, part } = stage.rayAt(up.clientX, up.clientY);
   const point = (part === "left" && other ? other.surface : surface).hit(raycaster);
-  if (measuring) {
+  if (tape.inUse) {
     if (!point) return;
-    if (measuring.length === 2) measuring = [];
-    measuring.push(point.toArray());
+    tape.add(point.toArray());
     drawTape();
     return;
   }
@@ -443,60 +398,31 @@ $("canvas").addEventListener("pointerup", (up) => {
 });
 
 function drawTape() {
-  tape.begin();
-  const rgb = rgbOf(theme.measure), points = measuring ?? [];
-  for (const [x, y, z] of points) {
-    tape.add([x - 0.08, y, z], [x + 0.08, y, z], rgb, 3);
-    tape.add([x, y - 0.08, z], [x, y + 0.08, z], rgb, 3);
-  }
-  if (points.length === 2) tape.add(points[0], points[1], rgb, 3);
-  tape.end();
+  tape.draw(theme);
   stage.ask();
 }
-function tapeLabels() {
-  if (measuring?.length !== 2) return [];
-  const [a, b] = measuring;
-  const across = Math.hypot(a[0] - b[0], a[1] - b[1]), up = b[2] - a[2];
-  return [{ at: a.map((v, i) => (v + b[i]) / 2), text: `${metres(Math.hypot(across, up))}  (level ${metres(across)}, up ${up.toFixed(2)} m)`, kind: "measure", rank: 0 }];
-}
 
-// The address holds the view: camera, selection, times.
-function saveLink(now = false) {
-  clearTimeout(saveLink.timer);
-  const save = () => {
-    const camera = [...stage.camera.position.toArray(), ...stage.controls.target.toArray()].map((v) => v.toFixed(2)).join(",");
-    const parts = [["c", camera], ["sel", selected], ["t", time.at?.toFixed(3)], ["since", time.since?.toFixed(3)], ["split", stage.split ? 1 : null], ["top", stage.top ? 1 : null]];
-    history.replaceState(null, "", `#${parts.filter(([, v]) => v !== null && v !== undefined).map(([k, v]) => `${k}=${v}`).join("&")}`);
-  };
-  if (now) save();
-  else saveLink.timer = setTimeout(save, 400);
-}
-stage.controls.addEventListener("change", () => { if (stage.touched || !wantsFit) saveLink(); });
+stage.controls.addEventListener("change", () => { if (stage.touched || !wantsFit) link.save(); });
 
 function restoreLink() {
-  const parts = new URLSearchParams(location.hash.slice(1));
-  const camera = (parts.get("c") ?? "").split(",").map(Number);
-  if (camera.length === 6 && camera.every(Number.isFinite)) {
+  const { camera, top, split, since, selected: wanted, at } = readLink();
+  if (camera) {
     restored = true;
     stage.camera.position.fromArray(camera);
     stage.controls.target.fromArray(camera, 3);
-    if (parts.get("top")) {
+    if (top) {
       stage.top = true;
       stage.controls.enableRotate = false;
       press("tool-top", true);
     }
     stage.controls.update();
   }
-  if (parts.get("split")) actions.split();
-  if (parts.get("since")) time.since = Number(parts.get("since"));
-  const wanted = { id: parts.get("sel"), at: parts.has("t") ? Number(parts.get("t")) : null };
-  const wait = setInterval(() => {
-    if (!time.range) return;
-    if (wanted.id && !store.find(wanted.id) && performance.now() < 10000) return;
-    clearInterval(wait);
-    if (wanted.id) select(wanted.id);
-    if (Number.isFinite(wanted.at) && wanted.at !== null) time.goTo(wanted.at);
-  }, 150);
+  if (split) actions.split();
+  if (since !== null) time.since = since;
+  whenKnown(() => time.range, () => !wanted || store.find(wanted), () => {
+    if (wanted) select(wanted);
+    if (at !== null) time.goTo(at);
+  });
 }
 
 setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));

@@ -192,6 +192,18 @@ export class Stage {
     this.ask();
   }
 
+  /** An arrow's key moves over the ground, + and - go nearer and farther. */
+  step(key) {
+    const { target } = this.controls, reach = this.camera.position.distanceTo(target);
+    const ahead = target.clone().sub(this.camera.position).setZ(0);
+    if (ahead.lengthSq() < 1e-6) ahead.set(0, 1, 0);
+    ahead.normalize().multiplyScalar(0.12 * reach);
+    const by = { ArrowUp: [ahead.x, ahead.y], ArrowDown: [-ahead.x, -ahead.y], ArrowLeft: [-ahead.y, ahead.x], ArrowRight: [ahead.y, -ahead.x] }[key];
+    if (by) return this.follow([0, 0], by);
+    this.camera.position.sub(target).multiplyScalar(key === "+" || key === "=" ? 0.8 : 1.25).add(target);
+    this.controls.update();
+  }
+
   /** A ray through a point of the canvas, and the part that it lies in. */
   rayAt(clientX, clientY) {
     const rect = this.canvas.getBoundingClientRect();
