@@ -8,20 +8,20 @@ usage() {
   cat <<'TEXT'
 usage: build.sh [--core] [--tests] [--werror] [--sanitize thread|address] [-- CMAKE_ARGUMENT...]
   --core      only pocd_core (library, pocd_map, pocd_parameters): needs no Fast DDS
-  --tests     also the tests and benchmarks
+  --tests     also the tests and benchmarks; with --core, those of the core
   --werror    warnings are errors
   --sanitize  thread: ThreadSanitizer; address: AddressSanitizer and UndefinedBehaviorSanitizer
 example: build.sh --tests -- -DCMAKE_BUILD_TYPE=Debug
 TEXT
 }
 
-selection=(--packages-skip pocd_test)
+core="" tests=""
 werror=OFF
 base=() sanitizer=()
 while [[ $# -gt 0 ]]; do
   case "$1" in
-    --core) selection=(--packages-select pocd_core) ;;
-    --tests) selection=() ;;
+    --core) core=1 ;;
+    --tests) tests=1 ;;
     --werror) werror=ON ;;
     --sanitize)
       shift
@@ -42,6 +42,11 @@ while [[ $# -gt 0 ]]; do
   shift
 done
 
+# Only here: what a program leaves in output/, as npm does, may look like a package, too.
+packages=(pocd_core) integration=OFF
+[[ -z "$core" ]] && packages+=(pocd_msgs pocd_dds) && integration=ON
+[[ -n "$tests" ]] && packages+=(test)
+
 # A compiler of PCL code takes up to 2 GB: no more at once than fit.
 available_gb=$(($(sed -n 's/^MemAvailable: *\([0-9]*\) kB/\1/p' /proc/meminfo) / 1048576))
 jobs=$(nproc)
@@ -50,10 +55,9 @@ jobs=$(nproc)
 
 # MAKEFLAGS keeps colcon from adding a limit by load average, which on a busy machine means one job.
 export CMAKE_GENERATOR=Ninja CMAKE_BUILD_PARALLEL_LEVEL=$jobs MAKEFLAGS="-j$jobs"
-# Only here: what a program leaves in output/, as npm does, may look like a package, too.
-if ! colcon --log-level error build --base-paths pocd_core pocd_msgs pocd_dds test \
-  --merge-install --executor sequential "${base[@]}" "${selection[@]}" \
-  --cmake-args "-DPOCD_WERROR=$werror" --no-warn-unused-cli "${sanitizer[@]}" "$@"; then
+if ! colcon --log-level error build --base-paths "${packages[@]}" \
+  --merge-install --executor sequential "${base[@]}" \
+  --cmake-args "-DPOCD_WERROR=$werror" "-DPOCD_TEST_INTEGRATION=$integration" --no-warn-unused-cli "${sanitizer[@]}" "$@"; then
   # Ninja reports compiler errors on stdout, which colcon keeps in a file.
   failed=$(ls -t log/latest_build/*/stdout_stderr.log 2>/dev/null | head -n 1)
   if [[ -n "$failed" ]]; then

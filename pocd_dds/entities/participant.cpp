@@ -391,11 +391,21 @@ DataReaderQos Participant::reader_qos(const std::string& topic, const Delivery& 
 
 DataReader* Participant::make_reader(Subscriber& subscriber, Topic& topic, const DataReaderQos& qos,
                                      DataReaderListener& listener) {
+  if (within_bus_log()) {
+    throw InputError("topic " + topic.get_name() +
+                     ": the function given to set_bus_log must not make a reader");
+  }
   const std::lock_guard<std::mutex> lock(impl_->making_readers);
   return subscriber.create_datareader(&topic, qos, &listener);
 }
 
 void Participant::delete_reader(Subscriber& subscriber, DataReader& reader) {
+  if (within_bus_log()) {
+    log_error(
+        "topic {}: the function given to set_bus_log must not delete a reader: both may wait "
+        "for each other for ever",
+        reader.get_topicdescription()->get_name());
+  }
   reader.set_listener(nullptr);
   const std::lock_guard<std::mutex> lock(impl_->making_readers);
   subscriber.delete_datareader(&reader);

@@ -77,8 +77,9 @@ class Participant {
 
   /// Every reader of this participant is made and deleted here, one at a time: Fast DDS 2.9.1 keeps
   /// them in a list that `WLP::remove_local_reader` changes without a lock. (It has one for
-  /// writers.) Not from a listener: both may wait for a callback that runs. Null when Fast DDS
-  /// makes none.
+  /// writers.) Not from a listener, and not from the function given to set_bus_log: both may wait
+  /// for a callback that runs. In the latter, make_reader throws InputError and delete_reader says
+  /// so on stderr. Null when Fast DDS makes none.
   eprosima::fastdds::dds::DataReader* make_reader(
       eprosima::fastdds::dds::Subscriber& subscriber, eprosima::fastdds::dds::Topic& topic,
       const eprosima::fastdds::dds::DataReaderQos& qos,

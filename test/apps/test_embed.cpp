@@ -15,7 +15,7 @@ CommandResult configure(const std::string& source, const std::string& build) {
   // None of these is asked for, though all may be installed.
   return run_command({POCD_CMAKE, "-S", source, "-B", build, "-DCMAKE_PREFIX_PATH=" + kPrefix,
                       "-DCMAKE_CXX_COMPILER_LAUNCHER=" POCD_LAUNCHER, "-DCMAKE_BUILD_TYPE=Release",
-                      "-DCMAKE_DISABLE_FIND_PACKAGE_PCL=ON",
+                      "-DCMAKE_CXX_FLAGS=" POCD_CXX_FLAGS, "-DCMAKE_DISABLE_FIND_PACKAGE_PCL=ON",
                       "-DCMAKE_DISABLE_FIND_PACKAGE_embree=ON",
                       "-DCMAKE_DISABLE_FIND_PACKAGE_yaml-cpp=ON"});
 }

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <functional>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
@@ -15,6 +17,7 @@
 #include "over_the_bus.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/bus_log.hpp"
+#include "pocd_dds/entities/bus_log.hpp"
 #include "pocd_dds/entities/reader.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/map_mirror.hpp"
@@ -184,6 +187,39 @@ TEST(LibraryGuards, ThreadsDeleteReadersOfOneParticipantOneAfterTheOther) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(removed, 60);
   EXPECT_EQ(together, 0);
+}
+
+// Whoever makes or deletes one waits for listeners, and those for the log.
+TEST(LibraryGuards, ALogMakesAndDeletesNoReader) {
+  const TestDomain domain;
+  const auto bus = test_participant(domain);
+  dds::Wakeup wakeup;
+  auto reader = std::make_unique<Heard>(bus, dds::topics::kObjects, wakeup);
+  const auto said_of = [](const std::function<void()>& task) {
+    testing::internal::CaptureStderr();
+    set_bus_log([&](LogLevel, const std::string&) { task(); });
+    dds::log(LogLevel::kWarning, "the message itself");
+    set_bus_log(nullptr);
+    return testing::internal::GetCapturedStderr();
+  };
+  const std::string made = said_of([&] { Heard(bus, dds::topics::kObjects, wakeup); });
+  EXPECT_NE(made.find("pocd: warning: the message itself"), std::string::npos) << made;
+  EXPECT_NE(made.find("topic pocd/objects: the function given to set_bus_log must not make"),
+            std::string::npos)
+      << made;
+  MirrorOptions options;
+  options.domain = domain.number();
+  const std::string mirrored = said_of([&] { const MapMirror mirror(options); });
+  EXPECT_NE(mirrored.find("set_bus_log must not make a reader"), std::string::npos) << mirrored;
+  const std::string deleted = said_of([&] { reader.reset(); });
+  EXPECT_NE(deleted.find("topic pocd/objects: the function given to set_bus_log must not delete"),
+            std::string::npos)
+      << deleted;
+  const std::string set = said_of([] { set_bus_log(nullptr); });
+  EXPECT_NE(set.find("set_bus_log is called by the function that was given to it"),
+            std::string::npos)
+      << set;
+  const Heard after(bus, dds::topics::kObjects, wakeup);  // as before, beside a log
 }
 
 TEST(LibraryGuards, SayNothingOnStdout) {

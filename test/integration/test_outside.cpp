@@ -37,7 +37,8 @@ TEST(Outside, ExampleBuildsAgainstTheInstalledPackageAndFollowsTheMap) {
   const std::string build = (folder.path() / "build").string();
   const CommandResult configured =
       run_command({POCD_CMAKE, "-S", source("pocd_dds/examples/map_mirror"), "-B", build, "-G",
-                   POCD_GENERATOR, std::string("-DCMAKE_PREFIX_PATH=") + POCD_BIN_DIR + "/.."});
+                   POCD_GENERATOR, "-DCMAKE_CXX_FLAGS=" POCD_CXX_FLAGS,
+                   std::string("-DCMAKE_PREFIX_PATH=") + POCD_BIN_DIR + "/.."});
   ASSERT_EQ(configured.exit_code, 0) << configured.out << configured.err;
   const CommandResult built = run_command({POCD_CMAKE, "--build", build});
   ASSERT_EQ(built.exit_code, 0) << built.out << built.err;

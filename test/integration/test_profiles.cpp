@@ -124,21 +124,24 @@ TEST(Participant, ATopicGoesWithItsLastUser) {
   bus->publisher()->delete_datawriter(left);
 }
 
-// Preallocated, each of ten samples would have the largest size of its type, 5 MB.
+// Preallocated, a sample would have the largest size of its type, 5 MB. The writer keeps up to ten;
+// one here, where nobody reads.
 TEST(Participant, SamplesOfAWriterTakeNoMoreThanTheyNeed) {
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "a sanitizer has a heap of its own";
+#endif
   const TestDomain domain;
   const auto bus = test_participant(domain);
-  dds::Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType> writer(bus,
-                                                                      dds::topics::kDiagnostics);
   const auto in_use = [] {
     const struct mallinfo2 info = mallinfo2();
     return info.uordblks + info.hblkhd;
   };
-  diagnostic_msgs::msg::DiagnosticArray sample;
-  writer.write(sample);
   const std::size_t before = in_use();
-  for (int i = 0; i < 20; ++i) writer.write(sample);
-  EXPECT_LT(in_use(), before + (1u << 20));
+  dds::Writer<diagnostic_msgs::msg::DiagnosticArrayPubSubType> writer(bus,
+                                                                      dds::topics::kDiagnostics);
+  diagnostic_msgs::msg::DiagnosticArray sample;
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(writer.write(sample));
+  EXPECT_LT(in_use(), before + (4u << 20));
 }
 
 // What says nothing of sizes has the kernel's: most images of a robot are lost then.

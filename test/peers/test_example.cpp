@@ -13,9 +13,10 @@ namespace {
 std::string built_lane_watch() {
   static const TemporaryFolder folder;
   const std::string prefix = POCD_BIN_DIR "/..", build = (folder.path() / "build").string();
-  const CommandResult configured = run_command(
-      {POCD_CMAKE, "-S", prefix + "/share/pocd_dds/examples/lane_watch", "-B", build,
-       "-DCMAKE_PREFIX_PATH=" + prefix, "-DCMAKE_CXX_COMPILER_LAUNCHER=" POCD_LAUNCHER});
+  const CommandResult configured =
+      run_command({POCD_CMAKE, "-S", prefix + "/share/pocd_dds/examples/lane_watch", "-B", build,
+                   "-DCMAKE_PREFIX_PATH=" + prefix, "-DCMAKE_CXX_COMPILER_LAUNCHER=" POCD_LAUNCHER,
+                   "-DCMAKE_CXX_FLAGS=" POCD_CXX_FLAGS});
   EXPECT_EQ(configured.exit_code, 0) << configured.err;
   const CommandResult built = run_command({POCD_CMAKE, "--build", build});
   EXPECT_EQ(built.exit_code, 0) << built.out << built.err;

@@ -73,7 +73,7 @@ Bytes rvl(const cv::Mat& depth) {
     for (; zeros < end; ++zeros) {
       const int difference = pixels[zeros] - previous;
       previous = pixels[zeros];
-      number(static_cast<std::uint32_t>(difference << 1 ^ difference >> 31));
+      number(static_cast<std::uint32_t>(difference * 2 ^ difference >> 31));
     }
     at = end;
   }
