@@ -2,7 +2,6 @@
 
 #include <condition_variable>
 #include <cstdio>
-#include <initializer_list>
 #include <mutex>
 #include <random>
 #include <tuple>
@@ -10,6 +9,7 @@
 #include "mirror/callback_thread.hpp"
 #include "mirror/catch_up.hpp"
 #include "mirror/look_copy.hpp"
+#include "mirror/mirror_bus.hpp"
 #include "mirror/object_copy.hpp"
 #include "mirror/part_assembler.hpp"
 #include "mirror/publishers.hpp"
@@ -21,8 +21,6 @@
 #include "pocd_dds/bridge/map_messages.hpp"
 #include "pocd_dds/bridge/object_messages.hpp"
 #include "pocd_dds/entities/bus_log.hpp"
-#include "pocd_dds/entities/reader.hpp"
-#include "pocd_dds/entities/writer.hpp"
 #include "pocd_msgsPubSubTypes.h"
 
 namespace pocd {
@@ -44,13 +42,6 @@ std::array<std::uint8_t, 16> random_id() {
   return id;
 }
 
-/// The table's bound is that of a writer; others may publish their objects on the topic, too.
-dds::Delivery objects_of_all_maps() {
-  dds::Delivery delivery = dds::topics::kObjects.delivery;
-  delivery.max_instances = 0;
-  return delivery;
-}
-
 std::string conflict(std::uint32_t map_id, std::uint64_t followed,
                      const std::vector<std::uint64_t>& rivals) {
   char text[160];
@@ -61,33 +52,6 @@ std::string conflict(std::uint32_t map_id, std::uint64_t followed,
                 static_cast<unsigned long long>(rivals.front()));
   return text;
 }
-
-/// What a mirror has on the bus. It goes and comes as a whole.
-struct MapMirrorBus {
-  MapMirrorBus(std::shared_ptr<dds::Participant> of, const MirrorOptions& options,
-               dds::Wakeup& wakeup)
-      : participant(std::move(of)),
-        manifests(participant, dds::topics::kMapManifest, wakeup),
-        deltas(participant, dds::topics::kMapDeltas, wakeup),
-        object_states(participant, dds::topics::kObjects, dds::topics::kObjects.name,
-                      objects_of_all_maps(), wakeup),
-        events(participant, dds::topics::kObjectEvents, wakeup),
-        requests(participant, dds::topics::kSnapshotRequest),
-        look_states(options.looks ? std::make_unique<dds::Reader<msg::MapLooksPubSubType>>(
-                                        participant, dds::topics::kMapLooks, wakeup)
-                                  : nullptr) {}
-
-  std::shared_ptr<dds::Participant> participant;
-  dds::Reader<msg::MapManifestPubSubType> manifests;
-  dds::Reader<msg::MapDeltaPubSubType> deltas;
-  dds::Reader<msg::ObjectStatePubSubType> object_states;
-  dds::Reader<msg::ObjectEventPubSubType> events;
-  dds::Writer<msg::MapSnapshotRequestPubSubType> requests;
-  std::unique_ptr<dds::Reader<msg::MapLooksPubSubType>> look_states;  // null: not wanted
-  // Only while snapshots are waited for, or tiles are gathered.
-  std::unique_ptr<dds::Reader<msg::MapSnapshotReplyPubSubType>> replies;
-  std::unique_ptr<dds::Reader<msg::MapTilePubSubType>> tiles;
-};
 
 }  // namespace
 
@@ -109,7 +73,7 @@ struct MapMirror::Impl {
 
   void tell(const std::string& text) const { dds::log_error("{}: {}", options.name, text); }
   /// With a participant that others may share, but not with this one.
-  std::unique_ptr<MapMirrorBus> join(const std::shared_ptr<dds::Participant>& instead_of);
+  std::unique_ptr<dds::MirrorBus> join(const std::shared_ptr<dds::Participant>& instead_of);
   void turn();
   void join_anew_if_deaf();
   void stop_gathering();
@@ -126,7 +90,6 @@ struct MapMirror::Impl {
   /// What the publisher that is followed says of itself; null before it was heard.
   const msg::MapManifest* followed() const { return manifest ? &*manifest : nullptr; }
   void catch_up();
-  void count_damaged();
   void ask();
   MirrorStatus status_now() const;
 
@@ -134,7 +97,7 @@ struct MapMirror::Impl {
   const std::array<std::uint8_t, 16> id;
   dds::Wakeup wakeup;
   /// Only the thread replaces it, under the mutex.
-  std::unique_ptr<MapMirrorBus> bus;
+  std::unique_ptr<dds::MirrorBus> bus;
   dds::RejoinPlan rejoining;
   // While tiles are gathered; by the thread.
   std::map<std::array<std::uint8_t, 16>, std::uint64_t> epoch_of_writer;
@@ -161,9 +124,9 @@ struct MapMirror::Impl {
   dds::ReadingThread thread;
 };
 
-std::unique_ptr<MapMirrorBus> MapMirror::Impl::join(
+std::unique_ptr<dds::MirrorBus> MapMirror::Impl::join(
     const std::shared_ptr<dds::Participant>& instead_of) {
-  return std::make_unique<MapMirrorBus>(
+  return std::make_unique<dds::MirrorBus>(
       dds::shared_participant(
           {options.domain, options.profiles_file, options.name, options.security_folder},
           instead_of),
@@ -179,7 +142,7 @@ void MapMirror::Impl::join_anew_if_deaf() {
   dds::log_warning("{}: nothing was heard of the publisher for {} s: joins the bus anew",
                    options.name, std::chrono::duration_cast<std::chrono::seconds>(silence).count());
   // The new one before the old one goes, so that it gets other ports.
-  std::unique_ptr<MapMirrorBus> other = join(bus->participant);
+  std::unique_ptr<dds::MirrorBus> other = join(bus->participant);
   const std::lock_guard<std::mutex> lock(mutex);
   if (bus->tiles) stop_gathering();
   objects.begin_anew();
@@ -205,7 +168,7 @@ void MapMirror::Impl::turn() {
     take_replies();
     take_manifests();
     take_tiles();
-    count_damaged();
+    bus->count_damaged(problems);
     catch_up();
   }
   changed.notify_all();
@@ -304,14 +267,6 @@ void MapMirror::Impl::take_tiles() {
       follower.tile_gone(epoch->second, tile->second);
     }
   });
-}
-
-void MapMirror::Impl::count_damaged() {
-  for (dds::RawReader* reader : std::initializer_list<dds::RawReader*>{
-           &bus->manifests, &bus->deltas, &bus->object_states, &bus->events, bus->look_states.get(),
-           bus->replies.get(), bus->tiles.get()}) {
-    if (reader != nullptr) problems.count_damaged(*reader);
-  }
 }
 
 void MapMirror::Impl::catch_up() {

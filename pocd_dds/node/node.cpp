@@ -12,18 +12,7 @@
 
 #include "pocd/common/check.hpp"
 #include "pocd/common/cpu_time.hpp"
-#include "pocd/pipeline/pocd_pipeline.hpp"
-#include "pocd_dds/node/command_desk.hpp"
-#include "pocd_dds/node/event_feed.hpp"
-#include "pocd_dds/node/frame_log.hpp"
-#include "pocd_dds/node/latency_log.hpp"
-#include "pocd_dds/node/look_publication.hpp"
-#include "pocd_dds/node/map_publication.hpp"
-#include "pocd_dds/node/node_memory.hpp"
-#include "pocd_dds/node/object_publication.hpp"
-#include "pocd_dds/node/rival_watch.hpp"
-#include "pocd_dds/node/ros_graph.hpp"
-#include "pocd_dds/node/ros_outputs.hpp"
+#include "pocd_dds/node/node_impl.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -44,120 +33,46 @@ BusOptions watched(BusOptions bus, const NodeConfig& node, BusWatch& watch) {
 
 }  // namespace
 
-struct Node::Impl {
-  explicit Impl(const NodeOptions& options)
-      : config(options.config),
-        on_status(options.on_status),
-        participant(std::make_shared<Participant>(watched(options.bus, config.node, watch))),
-        pipeline(config.pipeline),
-        keeper(config),
-        latency(options.latency_file),
-        queue(static_cast<std::size_t>(config.node.queue_frames)),
-        outputs(participant, config, options.epoch),
-        clock(participant, config.node.use_clock, outputs_wakeup),
-        rivals(participant, {static_cast<std::uint32_t>(config.node.map_id), options.epoch},
-               wakeup),
-        frames(participant, options.epoch),
-        objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
-        map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
-        health(config.node.health_window_s, config.node.stall_s) {
-    const MapRun run{static_cast<std::uint32_t>(config.node.map_id), options.epoch,
-                     keeper.lineage(options.epoch)};
-    if (config.node.commands) desk = std::make_unique<CommandDesk>(participant, run, wakeup);
-    if (keeper.on()) {
-      feed = std::make_unique<EventFeed>(participant, config, wakeup);
-      looks = std::make_unique<LookPublication>(participant, run);
-      keeper.restore(pipeline, map, objects, *looks, options.epoch, options.bus.name);
-    }
-    // What says that the node is there, and what brings frames, comes after all that is known.
-    status = std::make_unique<StatusPublication>(participant, options.bus.name, options.epoch,
-                                                 config.node.outputs);
-    graph = std::make_unique<RosGraph>(participant, config.node.outputs);
-    intake =
-        std::make_unique<Intake>(participant, config.node, config.pipeline, watch, queue, latency);
-    worker = std::thread([this] { guard("pocd_worker", [this] { work(); }); });
-    teller = std::thread([this] { guard("pocd_teller", [this] { tell(); }); });
-    drawer = std::thread([this] { guard("pocd_drawer", [this] { draw(); }); });
+Node::Impl::Impl(const NodeOptions& options)
+    : config(options.config),
+      on_status(options.on_status),
+      participant(std::make_shared<Participant>(watched(options.bus, config.node, watch))),
+      pipeline(config.pipeline),
+      keeper(config),
+      latency(options.latency_file),
+      queue(static_cast<std::size_t>(config.node.queue_frames)),
+      outputs(participant, config, options.epoch),
+      clock(participant, config.node.use_clock, outputs_wakeup),
+      rivals(participant, {static_cast<std::uint32_t>(config.node.map_id), options.epoch}, wakeup),
+      frames(participant, options.epoch),
+      objects(participant, config, options.epoch, keeper.lineage(options.epoch)),
+      map(participant, config, options.epoch, wakeup, keeper.lineage(options.epoch)),
+      health(config.node.health_window_s, config.node.stall_s) {
+  const MapRun run{static_cast<std::uint32_t>(config.node.map_id), options.epoch,
+                   keeper.lineage(options.epoch)};
+  if (config.node.commands) desk = std::make_unique<CommandDesk>(participant, run, wakeup);
+  if (keeper.on()) {
+    feed = std::make_unique<EventFeed>(participant, config, wakeup);
+    looks = std::make_unique<LookPublication>(participant, run);
+    keeper.restore(pipeline, map, objects, *looks, options.epoch, options.bus.name);
   }
+  // What says that the node is there, and what brings frames, comes after all that is known.
+  status = std::make_unique<StatusPublication>(participant, options.bus.name, options.epoch,
+                                               config.node.outputs);
+  graph = std::make_unique<RosGraph>(participant, config.node.outputs);
+  intake =
+      std::make_unique<Intake>(participant, config.node, config.pipeline, watch, queue, latency);
+  worker = std::thread([this] { guard("pocd_worker", [this] { work(); }); });
+  teller = std::thread([this] { guard("pocd_teller", [this] { tell(); }); });
+  drawer = std::thread([this] { guard("pocd_drawer", [this] { draw(); }); });
+}
 
-  ~Impl() {
-    intake->stop();
-    if (worker.joinable()) worker.join();
-    stop(told, tellers_wakeup, teller);
-    stop(drawn, outputs_wakeup, drawer);
-  }
-
-  /// What a thread ends with is what run() throws. Threads have names for debuggers and `top -H`.
-  void guard(const char* name, const std::function<void()>& task);
-  void work();
-  void tell();
-  void draw();
-  static void stop(std::atomic<bool>& over, Wakeup& wakeup, std::thread& thread);
-  void process(const Frame& frame);
-  /// Does what operators have said meanwhile; true when something was done.
-  bool follow_words();
-  void publish(bool now);
-  /// What is wrong on the bus beside the robots' topics.
-  void add_problems(IntakeStatus& input);
-  NodeState judge(const IntakeStatus& input, const WorkStatus& work, const std::string& word);
-  void send_status(const std::string& word);
-  void send_outputs(bool last);
-  void answer_words();
-  void turn();
-  bool finish();
-
-  const NodeFile config;
-  const std::function<void(const NodeReport&, const pocd_msgs::msg::NodeHealth&)> on_status;
-  BusWatch watch;  // outlives the participant
-  const std::shared_ptr<Participant> participant;
-  PocdPipeline pipeline;  // worker only
-  NodeMemory keeper;      // worker only, but for its status
-  LatencyLog latency;
-  FrameQueue queue;
-  Wakeup wakeup;
-
-  // Written by the telling thread, filled by the worker; both guard themselves.
-  Wakeup tellers_wakeup;
-  std::atomic<bool> told{false};
-
-  // The drawing thread only, until it has ended; but for what is thread-safe.
-  Wakeup outputs_wakeup;
-  RosOutputs outputs;
-  NodeClock clock;  // thread-safe
-  std::atomic<bool> drawn{false};
-  std::atomic<std::uint64_t> draws_failed{0};
-
-  // run()'s thread only.
-  RivalWatch rivals;
-  ProblemCounter problems;
-  Clock::time_point status_sent{};
-  bool map_waits = false;
-  bool ending = false, failing = false;  // the latter by the last status
-
-  // Guards everything below that several threads use; the map has a lock of its own, because only
-  // its data is so large that encoding and writing it would hold up the others.
-  mutable std::mutex mutex;
-  FrameLog frames;
-  ObjectPublication objects;
-  MapPublication map;
-  Pulse worker_pulse, teller_pulse;
-  std::unique_ptr<EventFeed> feed;         // run()'s thread only; null without a memory
-  std::unique_ptr<LookPublication> looks;  // guards itself; null without a memory
-  std::unique_ptr<CommandDesk> desk;       // guards itself; null without node.commands
-  WorkStatus counts;
-  double busy_ms = 0.0;
-  std::uint64_t busy_frames = 0;
-  std::exception_ptr failure;
-  std::atomic<bool> failed{false}, worked{false};
-
-  // run()'s thread only; its writers are made after all others.
-  std::unique_ptr<StatusPublication> status;
-  std::unique_ptr<RosGraph> graph;
-  HealthRule health;
-
-  std::unique_ptr<Intake> intake;
-  std::thread worker, teller, drawer;
-};
+Node::Impl::~Impl() {
+  intake->stop();
+  if (worker.joinable()) worker.join();
+  stop(told, tellers_wakeup, teller);
+  stop(drawn, outputs_wakeup, drawer);
+}
 
 void Node::Impl::guard(const char* name, const std::function<void()>& task) {
   pthread_setname_np(pthread_self(), name);
@@ -288,98 +203,6 @@ void Node::Impl::publish(bool now) {
   const StampNs stamp_ns = counts.stamp_ns;
   lock.unlock();
   if (step) keeper.step(pipeline, map.publisher(), stamp_ns);
-}
-
-void Node::Impl::add_problems(IntakeStatus& input) {
-  for (const std::uint64_t epoch : rivals.take()) {
-    spdlog::warn(
-        "{}: epoch {:016x} publishes map {} as well: subscribers follow one of the two and say "
-        "that "
-        "they are stale; give each node a node.map_id of its own",
-        topics::kMapManifest.name, epoch, config.node.map_id);
-  }
-  if (rivals.manifests_heard() > 0) {
-    input.problems.push_back(
-        {topics::kMapManifest.name, "second_publisher", rivals.manifests_heard(), ""});
-  }
-  if (outputs.grid_too_large()) {
-    input.problems.push_back({topics::kOccupancy.name, "grid_too_large", 1, ""});
-  }
-  if (outputs.grid_cut()) {
-    input.problems.push_back({topics::kOccupancy.name, "outside_extent", 1, ""});
-  }
-  for (const auto& [topic, count] : outputs.broken()) {
-    input.problems.push_back({topic, "output_failed", count, ""});
-  }
-  if (draws_failed > 0) input.problems.push_back({"rt/", "output_failed", draws_failed, ""});
-  const std::uint64_t dropped_events = objects.dropped_events();
-  if (dropped_events > 0) {
-    input.problems.push_back({topics::kObjectEvents.name, "events_dropped", dropped_events, ""});
-  }
-  rivals.count_problems(problems);
-  map.count_problems(problems);
-  clock.count_problems(problems);
-  keeper.count_problems(problems);
-  if (feed) feed->count_problems(problems);
-  if (desk) desk->count_problems(problems);
-  const auto more = problems.entries();
-  input.problems.insert(input.problems.end(), more.begin(), more.end());
-}
-
-NodeState Node::Impl::judge(const IntakeStatus& input, const WorkStatus& work,
-                            const std::string& word) {
-  HealthSigns signs;
-  signs.write_failures = work.write_failures;
-  signs.output_failures = outputs.failures() + draws_failed + graph->failures();
-  for (const auto& [topic, count] : outputs.broken()) signs.output_failures += count;
-  for (const auto& entry : input.problems) signs.problems += entry.count;
-  signs.dropped = queue.dropped();
-  const auto look = [&](const char* thread, double still_s, bool ended) {
-    if (ended || still_s <= signs.still_s) return;
-    signs.still_s = still_s;
-    signs.still_thread = thread;
-  };
-  look("the pipeline", worker_pulse.still_s(), worked);
-  look("the intake", intake->still_s(), ending);
-  look("the writer of objects", teller_pulse.still_s(), told);
-  look("Fast DDS's discovery", participant->still_s(), false);
-  NodeState state;
-  state.word = word;
-  state.still_s = signs.still_s;
-  state.verdict = health.judge(signs, Clock::now());
-  state.ready = !ending && signs.still_s < config.node.stall_s;
-  state.discovery_stalls = participant->stalls();
-  return state;
-}
-
-void Node::Impl::send_status(const std::string& word) {
-  IntakeStatus input = intake->status();
-  add_problems(input);
-  WorkStatus work;
-  {
-    const std::lock_guard<std::mutex> lock(mutex);
-    counts.processing_ms = busy_frames == 0 ? 0.0 : busy_ms / static_cast<double>(busy_frames);
-    busy_ms = 0.0;
-    busy_frames = 0;
-    counts.latency_ms = latency.take_longest_ms();
-    counts.intake_cpu_ms = input.cpu_ms;
-    counts.take_cpu_ms = input.take_cpu_ms;
-    counts.process_cpu_ms = process_cpu_ms();
-    counts.write_failures = objects.failures() + map.failures() + frames.failures() +
-                            (feed ? feed->failures() : 0) + (looks ? looks->failures() : 0) +
-                            (desk ? desk->failures() : 0);
-    counts.map = map.traffic();
-    counts.objects = objects.count();
-    counts.kept = keeper.on() ? std::make_optional(keeper.status()) : std::nullopt;
-    work = counts;
-  }
-  map.send_manifest(work.objects, word == "stopped" && map.waiting() == 0,
-                    work.kept.value_or(MemoryStatus{}));
-  NodeReport report{input, work, queue.size(), queue.dropped(), judge(input, work, word), ending};
-  failing = report.state.verdict.level >= 2;
-  const pocd_msgs::msg::NodeHealth health = status->send(report, clock.now_ns());
-  graph->update();
-  if (on_status) on_status(report, health);
 }
 
 void Node::Impl::send_outputs(bool last) {

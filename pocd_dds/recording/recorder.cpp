@@ -6,8 +6,6 @@
 #include <atomic>
 #include <exception>
 #include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/DataReaderListener.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <set>
@@ -19,24 +17,13 @@
 #include "pocd_dds/recording/latched_samples.hpp"
 #include "pocd_dds/recording/record_queue.hpp"
 #include "pocd_dds/recording/rerun_form.hpp"
+#include "pocd_dds/recording/tap.hpp"
 
 namespace pocd::dds {
 
 using namespace eprosima::fastdds::dds;  // NOLINT: this file is about nothing else
-using eprosima::fastrtps::types::ReturnCode_t;
 
 namespace {
-
-std::uint64_t nanoseconds(const eprosima::fastrtps::rtps::Time_t& time) {
-  const std::int64_t ns = time.to_ns();
-  return ns > 0 ? static_cast<std::uint64_t>(ns) : 0;
-}
-
-std::uint64_t now_ns() {
-  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                        std::chrono::system_clock::now().time_since_epoch())
-                                        .count());
-}
 
 /// The file, when no recording is lost by it. What is replaced goes as a whole: of a longer split
 /// recording no file is left beside those of the new one.
@@ -54,97 +41,6 @@ const std::filesystem::path& checked(const RecorderOptions& options) {
   }
   return options.output;
 }
-
-struct Counts {
-  std::atomic<std::uint64_t> messages{0}, bytes{0}, lost{0};
-};
-
-/// One reader and the channels that its samples go to.
-class Tap : public DataReaderListener {
- public:
-  Tap(RecordQueue& queue, Counts& counts, std::uint16_t channel,
-      std::optional<std::uint16_t> instances, bool keys_known, bool latched)
-      : queue_(queue),
-        counts_(counts),
-        channel_(channel),
-        instances_(instances),
-        keys_known_(keys_known),
-        latched_(latched) {}
-
-  void on_data_available(DataReader* reader) override {
-    SampleInfo info;
-    while (true) {
-      if (sample_.payload.capacity() == 0) sample_.payload = queue_.buffer();
-      if (reader->take_next_sample(&sample_, &info) != ReturnCode_t::RETCODE_OK) return;
-      take(info);
-    }
-  }
-  /// A late joiner gets nothing of a writer that has gone. (Of a keyed topic its instances go.)
-  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
-    if (!latched_ || instances_ || status.current_count_change >= 0) return;
-    recording::MessageHeader header;
-    header.channel = channel_;
-    LatchKey writer{};
-    const eprosima::fastrtps::rtps::octet* handle = status.last_publication_handle.value;
-    std::copy_n(handle, writer.size(), writer.begin());
-    queue_.push({header, {}, latch(writer, Latch::Part::kWriterGone)});
-  }
-  void on_sample_lost(DataReader*, const SampleLostStatus& status) override {
-    counts_.lost += static_cast<std::uint64_t>(status.total_count_change);
-  }
-
- private:
-  void take(const SampleInfo& info) {
-    recording::MessageHeader header;
-    header.channel = channel_;
-    header.sequence = info.sample_identity.sequence_number().low;
-    header.log_time_ns = nanoseconds(info.reception_timestamp);
-    if (header.log_time_ns == 0) header.log_time_ns = now_ns();
-    header.publish_time_ns = nanoseconds(info.source_timestamp);
-    InstanceKey key{};
-    const eprosima::fastrtps::rtps::octet* handle = info.instance_handle.value;
-    std::copy_n(handle, key.size(), key.begin());
-    if (!info.valid_data) {
-      if (instances_) {
-        const bool disposed = info.instance_state == NOT_ALIVE_DISPOSED_INSTANCE_STATE;
-        push_instance(header, disposed ? InstanceChange::kDisposed : InstanceChange::kUnregistered,
-                      key);
-      }
-      return;
-    }
-    if (instances_ && !keys_known_) push_instance(header, InstanceChange::kWritten, key);
-    ++counts_.messages;
-    counts_.bytes += sample_.payload.size();
-    LatchKey source = key;
-    if (!instances_) {
-      const eprosima::fastrtps::rtps::octet* writer = info.publication_handle.value;
-      std::copy_n(writer, source.size(), source.begin());
-    }
-    queue_.push({header, std::move(sample_.payload), latch(source, Latch::Part::kSample)});
-    sample_.payload = {};
-  }
-
-  std::optional<Latch> latch(const LatchKey& source, Latch::Part part) const {
-    if (!latched_) return std::nullopt;
-    return Latch{channel_, source, instances_.has_value(), part};
-  }
-
-  void push_instance(recording::MessageHeader header, InstanceChange change,
-                     const InstanceKey& key) {
-    header.channel = *instances_;
-    const bool written = change == InstanceChange::kWritten;
-    queue_.push({header, instance_payload(change, key),
-                 latch(key, written ? Latch::Part::kInstance : Latch::Part::kGone)});
-  }
-
-  RecordQueue& queue_;
-  Counts& counts_;
-  const std::uint16_t channel_;
-  const std::optional<std::uint16_t> instances_;
-  const bool keys_known_;
-  const bool latched_;  // late joiners get the last samples, and so do later files
-  RawSample sample_;
-};
 
 }  // namespace
 
@@ -192,7 +88,7 @@ struct Recorder::Impl {
   const RecorderOptions options;
   Wakeup wakeup;
   RecordQueue queue;
-  Counts counts;
+  ReceivedCounts counts;
   mutable std::mutex writer_mutex;
   recording::SplitWriter writer;
   std::map<std::string, std::uint16_t> schemas;
