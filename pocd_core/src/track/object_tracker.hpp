@@ -106,8 +106,6 @@ class ObjectTracker {
   /// Whether two objects may be sides of one body: nothing was ever seen through between them, and
   /// they are no farther apart than the larger one is long.
   bool sides_of_one(Step& step, const LibraryObject& a, const LibraryObject& b) const;
-  /// Whether one of two objects that touch is clearly the smaller one: it is a piece of the other.
-  bool one_is_piece(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether `known` stood in its place for long enough before `found` was first seen that the free
   /// space around it is known.
   bool surroundings_known(const LibraryObject& found, const LibraryObject& known) const;

@@ -23,9 +23,6 @@ constexpr float kOutside = 0.4f;
 /// Two sides of a body face away from each other along the line between them, by this difference of
 /// cosines at least: surfaces that face one way are of two things in a row.
 constexpr float kApart = 0.2f;
-/// What touches a like thing is a part of it when it has less than this share of its surface: of
-/// two of one size, side by side, each is a thing.
-constexpr double kPieceShare = 0.6;
 
 bool told_apart(const LibraryObject& a, const LibraryObject& b) {
   const auto apart = [](const LibraryObject& x, const LibraryObject& y) {
@@ -52,15 +49,6 @@ double inside_share(const std::vector<Surfel>& surfels, const OrientedBox& box, 
   std::size_t inside = 0;
   for (const Surfel& s : surfels) inside += is_inside(box, margin_m, s.point_W);
   return static_cast<double>(inside) / static_cast<double>(surfels.size());
-}
-
-bool ObjectTracker::one_is_piece(const LibraryObject& a, const LibraryObject& b) const {
-  // Without a class, what touches may be two things.
-  if (a.class_id == kThing || told_apart(a, b)) return false;
-  const std::size_t of_a = a.model.surfels().size(), of_b = b.model.surfels().size();
-  const auto less = static_cast<double>(std::min(of_a, of_b));
-  const auto more = static_cast<double>(std::max(of_a, of_b));
-  return less < kPieceShare * more && connected(a, b);
 }
 
 bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const LibraryObject& b) const {
@@ -136,8 +124,7 @@ void ObjectTracker::join_sides(Step& step) {
         LibraryObject* other = library_.find(other_id);
         if (other_id == id || !other->confirmed || other->class_id != object->class_id ||
             object->looks_unobserved > 0 || other->looks_unobserved > 0 ||
-            !may_be_one(*object, *other) ||
-            !(sides_of_one(step, *object, *other) || one_is_piece(*object, *other))) {
+            !may_be_one(*object, *other) || !sides_of_one(step, *object, *other)) {
           continue;
         }
         join(step, *object, *other);

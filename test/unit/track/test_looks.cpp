@@ -168,34 +168,6 @@ TEST(Found, ThingsWhoseFacesAreInOnePlaneAreNoSidesOfOneThing) {
   EXPECT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
 }
 
-/// Two like boxes that touch. One visit showed the left one, another the right one, each without
-/// the seam; the third one showed both for a while. How many are known at the fourth one?
-std::size_t boxes_on_the_fourth_visit(double left_m, double right_m) {
-  const SceneObject left = solid(kBoxClass, {-0.5 * left_m, 2.3}, {left_m, 0.4, 1.3});
-  const SceneObject right = solid(kBoxClass, {0.5 * right_m, 2.3}, {right_m, 0.4, 1.3});
-  PipelineConfig config = test::room_config();
-  config.state.merge_frames = 1000;  // they are not joined for being one piece for long
-  TrackerRig rig(config);
-  const auto visit = [&](const Scene& scene, int looks) {
-    rig.look(scene, {}, 60.0);
-    rig.look_times(looks, scene);
-  };
-  for (const double x : {0.42, -0.42})
-    visit(room_with({left, right, solid(kCageClass, {x, 1.6}, {1.0, 0.1, 1.6})}), 10);
-  visit(room_with({left, right}), 10);
-  EXPECT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
-  visit(room_with({left, right}), 0);
-  return rig.of_class(kBoxClass).size();
-}
-
-TEST(Found, WhatTouchesALikeThingAndIsSmallerIsAPieceOfIt) {
-  EXPECT_EQ(boxes_on_the_fourth_visit(1.0, 0.4), 1u);
-}
-
-TEST(Found, TwoLikeThingsOfOneSizeThatTouchAreTwo) {
-  EXPECT_EQ(boxes_on_the_fourth_visit(0.7, 0.7), 2u);
-}
-
 // Of what left, a screen hid nearly the half: what came is larger than what was known.
 TEST(Found, AThingOfWhichOnlyAPartWasKnownMovesAsAWhole) {
   const Eigen::Vector3d size(0.9, 0.3, 0.7);
