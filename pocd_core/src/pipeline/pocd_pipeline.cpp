@@ -128,7 +128,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
                                                                 ? ": clocks were set back, goes on"
                                                                 : ": frame not used"));
     if (!result.accepted) return result;
-    p.tracker.set_clock_back(frame.stamp_ns);
+    p.tracker.set_clock_back(newest_ns, frame.stamp_ns);
   }
   if (const auto reason = p.pose_gate.refuse(frame)) {
     result.accepted = false;

@@ -1,8 +1,21 @@
 #include "pocd/track/departures.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace pocd {
+
+bool Departures::add(Departure departure) {
+  list_.push_back(std::move(departure));
+  if (list_.size() <= kMost) return true;
+  list_.pop_front();
+  return false;
+}
+
+void Departures::add_move(const Move& move) {
+  moves_.push_back(move);
+  if (moves_.size() > kMost) moves_.pop_front();
+}
 
 const std::deque<Departure>& Departures::recent(StampNs now_ns, double window_s) {
   const auto window_ns = static_cast<StampNs>(window_s * 1e9);
@@ -41,14 +54,16 @@ void Departures::set_asked_far(ObjectId id) {
   for (Departure& d : list_) d.asked_far |= d.id == id;
 }
 
-void Departures::set_clock_back(StampNs latest_ns) {
+void Departures::set_clock_back(StampNs newest_ns, StampNs latest_ns) {
+  const StampNs back_ns = newest_ns - latest_ns;
   for (Departure& d : list_) {
-    for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.first_gone_ns, &d.departed_ns})
+    for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.first_gone_ns})
       *stamp_ns = std::min(*stamp_ns, latest_ns);
+    d.departed_ns -= back_ns;
   }
   for (Move& m : moves_) {
-    for (StampNs* stamp_ns : {&m.in_place_ns, &m.moved_ns})
-      *stamp_ns = std::min(*stamp_ns, latest_ns);
+    m.in_place_ns = std::min(m.in_place_ns, latest_ns);
+    m.moved_ns -= back_ns;
   }
 }
 

@@ -232,7 +232,14 @@ void ObjectTracker::depart(Step& step, Departure departure, Rule rule) {
   event.first_gone_ns = departure.first_gone_ns;
   step.result.events.push_back(std::move(event));
   if (departure.part_of == ObjectId::kNone) step.result.retired.push_back(departure.id);
-  departures_.add(std::move(departure));
+  keep(std::move(departure), step.result);
+}
+
+void ObjectTracker::keep(Departure departure, FrameResult& result) {
+  if (departures_.add(std::move(departure))) return;
+  result.warnings.push_back("more than " + std::to_string(Departures::kMost) +
+                            " things departed within state.relocation_window_s: the oldest would "
+                            "be a new thing where it is found again");
 }
 
 bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {

@@ -64,7 +64,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                      config_.change.pose_tolerance_m);
 }
 
-void ObjectTracker::set_clock_back(StampNs now_ns) {
+void ObjectTracker::set_clock_back(StampNs newest_ns, StampNs now_ns) {
   const StampNs before_ns = now_ns - 1;
   const auto bound = [before_ns](StampNs& stamp_ns) { stamp_ns = std::min(stamp_ns, before_ns); };
   for (const auto& [id, object] : library_.all()) {
@@ -81,7 +81,7 @@ void ObjectTracker::set_clock_back(StampNs now_ns) {
     object->moment = {};
   }
   library_.touch_all();
-  departures_.set_clock_back(before_ns);
+  departures_.set_clock_back(newest_ns, before_ns);
 }
 
 void ObjectTracker::look_at_objects(Step& step) {

@@ -44,9 +44,9 @@ class ObjectTracker {
               const DistanceAt& distance_at, MapEdits& edits,
               std::vector<std::uint32_t>& owner_of_pixel, FrameResult& result);
 
-  /// From now on stamps go on from `now_ns`, which lies before those that are kept: all that is
-  /// known becomes known from just before it.
-  void set_clock_back(StampNs now_ns);
+  /// From now on stamps go on from `now_ns`, which lies before `newest_ns`, the newest so far: all
+  /// that is known becomes known from just before it.
+  void set_clock_back(StampNs newest_ns, StampNs now_ns);
 
   // What an operator says, between two frames (operator_acts.cpp).
 
@@ -130,6 +130,7 @@ class ObjectTracker {
   void remove(Step& step, LibraryObject& object, Rule rule);
   /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
   void depart(Step& step, Departure departure, Rule rule);
+  void keep(Departure departure, FrameResult& result);
   void confirm(Step& step, LibraryObject& object);
   /// Reports the object as moved when it is one that departed; false when there is none.
   bool find_origin(Step& step, LibraryObject& object);

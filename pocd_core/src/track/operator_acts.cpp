@@ -57,7 +57,7 @@ void ObjectTracker::confirm_removal(ObjectId id, const Said& said, MapEdits& edi
   result.retired.push_back(id);
   edits.clear(id);
   library_.erase(id);
-  departures_.add(std::move(departure));
+  keep(std::move(departure), result);
 }
 
 void ObjectTracker::note(const Said& said, const OrientedBox& where, FrameResult& result) {

@@ -300,67 +300,6 @@ TEST(PipelineChanges, OldThingsMoveAsNewOnesDo) {
   EXPECT_EQ(drive.pipeline().objects().size(), 2u);
 }
 
-// A replay that starts again: what is known is known from before, and its changes are found as if
-// the clocks had gone on.
-TEST(PipelineChanges, ClocksThatAreSetBackLoseNothing) {
-  constexpr StampNs kHour = 3600'000'000'000;
-  const auto drive_with = [](StampNs first_later_ns, Drive& drive) {
-    const auto watch = [&](const Scene& scene, int frames, StampNs later_ns) {
-      int used = 0;
-      for (int i = 0; i < frames; ++i) {
-        Frame frame = drive.next_frame(scene);
-        frame.stamp_ns += later_ns;
-        used += drive.process(frame).accepted;
-      }
-      return used;
-    };
-    const Scene before = room_with({left_box(), right_cage()});
-    watch(before, kLearn, first_later_ns);
-    const int used = watch(before, 20, 0);
-    // Gone, and found elsewhere at once and after a while.
-    const SceneObject moved_box = solid(kBoxClass, {-0.6, 1.5}, kSize);
-    watch(room_with({moved_box}), 2 * kPromptly, 0);
-    watch(room_with({moved_box, solid(kCageClass, {0.9, 1.6}, {0.5, 0.5, 0.8}, 0.3)}),
-          2 * kPromptly, 0);
-    return used;
-  };
-  Drive steady, set_back;
-  EXPECT_EQ(drive_with(0, steady), 20);
-  EXPECT_EQ(drive_with(kHour, set_back), 11) << "nine frames may be another robot's wrong clock";
-  // Nine frames fewer were used: when a box is known better may differ, what changed does not.
-  const auto changes = [](const Drive& drive) {
-    std::vector<ObjectEvent> list = drive.events();
-    list.erase(std::remove_if(list.begin(), list.end(),
-                              [](const ObjectEvent& e) { return e.kind == EventKind::kUpdated; }),
-               list.end());
-    return text(list);
-  };
-  EXPECT_EQ(changes(set_back), changes(steady));
-  EXPECT_EQ(set_back.of_kind(EventKind::kMoved).size(), 2u) << text(set_back.events());
-  ASSERT_TRUE(set_back.object_at(-0.6, 1.5));
-  EXPECT_LT(set_back.object_at(-0.6, 1.5)->last_seen_ns, kHour);
-}
-
-// One robot's clock is an hour behind: its frames are refused as long as others go on.
-TEST(PipelineChanges, ARobotWithAWrongClockDisturbsNobody) {
-  Drive drive;
-  const Scene scene = room_with({left_box(), right_cage()});
-  for (int i = 0; i < 60; ++i) {
-    Frame frame = drive.next_frame(scene);
-    const bool wrong = i % 2 == 1;
-    frame.robot = wrong ? "late" : "good";
-    if (!wrong) frame.stamp_ns += 3600'000'000'000;
-    const FrameResult result = drive.process(frame);
-    EXPECT_EQ(result.accepted, !wrong);
-    if (!wrong) continue;
-    ASSERT_EQ(result.warnings.size(), 1u);
-    EXPECT_EQ(result.warnings[0].find("late: stamp is 3599.9 s behind the newest: frame not used"),
-              0u)
-        << result.warnings[0];
-  }
-  EXPECT_EQ(drive.of_kind(EventKind::kAdded).size(), 2u) << text(drive.events());
-}
-
 TEST(PipelineChanges, EventsNameFrameAndRobot) {
   Drive drive;
   const Scene scene = room_with({left_box()});

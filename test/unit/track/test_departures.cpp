@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace pocd {
 namespace {
 
@@ -64,9 +66,9 @@ TEST(Departures, MovesAreKeptForTheWindowToo) {
   EXPECT_EQ(departures.recent_moves(160 * kSecond, 60.0).size(), 2u);
   ASSERT_EQ(departures.recent_moves(161 * kSecond, 60.0).size(), 1u);
   EXPECT_EQ(departures.recent_moves(161 * kSecond, 60.0).front().id, ObjectId{2});
-  departures.set_clock_back(50 * kSecond);
-  EXPECT_EQ(departures.recent_moves(110 * kSecond, 60.0).size(), 1u);
-  EXPECT_TRUE(departures.recent_moves(111 * kSecond, 60.0).empty()) << "by the new clock";
+  departures.set_clock_back(210 * kSecond, 50 * kSecond);
+  EXPECT_EQ(departures.recent_moves(100 * kSecond, 60.0).size(), 1u);
+  EXPECT_TRUE(departures.recent_moves(101 * kSecond, 60.0).empty()) << "as if it had gone on";
 }
 
 TEST(Motion, OfThoseThatExplainTheSameTheShortestIsLikeliest) {
@@ -80,19 +82,59 @@ TEST(Motion, OfThoseThatExplainTheSameTheShortestIsLikeliest) {
   EXPECT_GT(far.likelihood(), partly.likelihood()) << "seen as a whole, though farther";
 }
 
-TEST(Departures, AClockThatIsSetBackMakesThemJustDeparted) {
+TEST(Departures, AClockThatIsSetBackLeavesThemAsOldAsTheyAre) {
   Departures departures;
-  departures.add(departed(1, 3500 * kSecond));
+  departures.add(departed(1, 3590 * kSecond));
   departures.add(departed(2, 3600 * kSecond));
-  departures.set_clock_back(10 * kSecond);
-  const auto& kept = departures.recent(11 * kSecond, 60.0);
-  ASSERT_EQ(kept.size(), 2u);
+  departures.set_clock_back(3600 * kSecond, 10 * kSecond);
+  const auto& kept = departures.recent(60 * kSecond, 60.0);
+  EXPECT_EQ(ids(kept), (std::vector<std::uint32_t>{1, 2}));
   for (const Departure& d : kept) {
-    EXPECT_EQ(d.departed_ns, 10 * kSecond);
-    EXPECT_LE(d.in_place_ns, d.departed_ns);
+    EXPECT_LE(d.departed_ns, 10 * kSecond);
+    EXPECT_LE(d.in_place_ns, 10 * kSecond);
     EXPECT_LE(d.first_seen_ns, d.in_place_ns);
   }
-  EXPECT_TRUE(departures.recent(71 * kSecond, 60.0).empty()) << "they grow old by the new clock";
+  EXPECT_EQ(ids(departures.recent(60 * kSecond + 1, 60.0)), (std::vector<std::uint32_t>{2}));
+  EXPECT_TRUE(departures.recent(70 * kSecond + 1, 60.0).empty());
+}
+
+// A replay of 38 s, again and again: none of its stamps is ever older than the window.
+TEST(Departures, AClockThatIsSetBackAgainAndAgainKeepsNothingForEver) {
+  Departures departures;
+  Move move;
+  std::size_t most = 0, most_moves = 0;
+  for (std::uint32_t lap = 0; lap < 200; ++lap) {
+    for (std::uint32_t second = 0; second < 38; second += 2) {
+      departures.add(departed(100 * lap + second, second * kSecond));
+      move.moved_ns = second * kSecond;
+      departures.add_move(move);
+      most = std::max(most, departures.recent(second * kSecond, 60.0).size());
+      most_moves = std::max(most_moves, departures.recent_moves(second * kSecond, 60.0).size());
+    }
+    departures.set_clock_back(37 * kSecond, -1);
+  }
+  EXPECT_EQ(most, 31u) << "of 60 s, one every other second";
+  EXPECT_EQ(most_moves, 31u);
+}
+
+TEST(Departures, MoreThanTheMostAreNotKeptWhateverTheStamps) {
+  Departures departures;
+  Move move;
+  for (std::uint32_t i = 1; i <= Departures::kMost; ++i) {
+    ASSERT_TRUE(departures.add(departed(i, 5 * kSecond))) << i;
+    move.id = ObjectId{i};
+    departures.add_move(move);
+  }
+  EXPECT_FALSE(departures.add(departed(7777, 4 * kSecond)));
+  move.id = ObjectId{7777};
+  departures.add_move(move);
+  const auto& kept = departures.recent(5 * kSecond, 60.0);
+  EXPECT_EQ(kept.size(), Departures::kMost);
+  EXPECT_EQ(kept.front().id, ObjectId{2}) << "the oldest goes";
+  EXPECT_EQ(kept.back().id, ObjectId{7777});
+  const auto& moves = departures.recent_moves(5 * kSecond, 60.0);
+  EXPECT_EQ(moves.size(), Departures::kMost);
+  EXPECT_EQ(moves.front().id, ObjectId{2});
 }
 
 }  // namespace

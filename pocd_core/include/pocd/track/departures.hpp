@@ -18,7 +18,7 @@ struct Departure {
   StampNs first_seen_ns = 0;
   StampNs in_place_ns = 0;    ///< last seen in its place
   StampNs first_gone_ns = 0;  ///< first of the looks in a row that found it gone; 0: not known
-  StampNs departed_ns = 0;    ///< found gone
+  StampNs departed_ns = 0;    ///< found gone; its age is what counts
   Arrival arrival = Arrival::kUnknown;
   std::set<std::string> seen_by;
   Evidence evidence;
@@ -46,13 +46,18 @@ struct Move {
   OrientedBox from;  ///< where all that is known of it was
   Pose T_new_old = Pose::Identity();
   StampNs in_place_ns = 0;  ///< last seen at its old place
-  StampNs moved_ns = 0;     ///< found at the new one
+  StampNs moved_ns = 0;     ///< found at the new one; as Departure::departed_ns
 };
 
 /// Departures and moves within a window of time, oldest first. Not thread-safe.
 class Departures {
  public:
-  void add(Departure departure) { list_.push_back(std::move(departure)); }
+  /// Of each of the two: whatever the stamps are, no more are kept. A site has a few at a time;
+  /// each is compared with all that arrives, and written with every step of a memory.
+  static constexpr std::size_t kMost = 500;
+
+  /// False when the oldest had to go for it.
+  bool add(Departure departure);
   /// Those within `window_s` before `now_ns`; older ones are forgotten. Valid until the next call.
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
   bool has(ObjectId id) const;
@@ -60,11 +65,13 @@ class Departures {
   /// Those whose box has its middle [m, W] where `inside` accepts it.
   void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
   void set_asked_far(ObjectId id);
-  void add_move(const Move& move) { moves_.push_back(move); }
+  void add_move(const Move& move);
   /// As recent().
   const std::deque<Move>& recent_moves(StampNs now_ns, double window_s);
-  /// Nothing that is kept happened after `latest_ns`.
-  void set_clock_back(StampNs latest_ns);
+  /// The clock that was at `newest_ns` goes on from `latest_ns`: nothing that is kept happened
+  /// later, and all of it stays as old as it is. A replay that starts again and again would keep
+  /// it for ever otherwise.
+  void set_clock_back(StampNs newest_ns, StampNs latest_ns);
 
  private:
   friend struct ArchiveAccess;
