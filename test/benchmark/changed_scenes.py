@@ -6,10 +6,12 @@ nothing. A true change is
   exact     when there is a net change of its kind with its places: a box's middle lies in the true footprint, grown
             by 0.35 m (the old one for REMOVED, the new one for ADDED, both for MOVED);
   in place  also when it is told as another kind there: a move as REMOVED and ADDED, or one of the two.
-Further net changes within 0.5 m of a true change's footprint are duplicates, all others are false. What nobody could
-see is not asked. F1 is that of exact changes: 2 exact / (true changes + told ones).
+Further net changes within 0.5 m of a true change's footprint are duplicates, all others are false; of these, what is told
+as ADDED with the arrival `found` was seen for the first time, and not said to have come. What nobody could see is not asked. F1 is that of exact changes: 2 exact / (true changes + told ones).
 By hand, not a test.
-usage: changed_scenes.py BIN_DIR MESH_DIR OUTPUT_DIR SEEDS [KIND...]   (SEEDS: 1-8 or 1,5,9; KIND: circuit, warehouse)
+With --no-masks the segmentation images are left out.
+usage: changed_scenes.py BIN_DIR MESH_DIR OUTPUT_DIR SEEDS [--no-masks] [KIND...]   (SEEDS: 1-8 or 1,5,9; KIND: circuit,
+warehouse)
 """
 import concurrent.futures
 import csv
@@ -61,8 +63,8 @@ class Change:
 class Told:
     """What became of one object in the second lap."""
 
-    def __init__(self, kind, old, new):
-        self.kind, self.old, self.new = kind, old, new
+    def __init__(self, kind, old, new, arrival=""):
+        self.kind, self.old, self.new, self.arrival = kind, old, new, arrival
 
 
 def net_changes(events_csv, kind):
@@ -78,7 +80,7 @@ def net_changes(events_csv, kind):
             before = told.get(number)
             was_added = before is not None and before.kind == "ADDED"
             if row["kind"] == "ADDED" or (row["kind"] == "MOVED" and was_added):
-                told[number] = Told("ADDED", None, here)
+                told[number] = Told("ADDED", None, here, before.arrival if was_added else row["arrival"])
             elif row["kind"] == "MOVED":
                 old = (float(row["previous_x"]), float(row["previous_y"]))
                 told[number] = Told("MOVED", before.old if before and before.old else old, here)
@@ -111,21 +113,35 @@ def score(truth, events_csv, kind):
     duplicates = [t for t in left if any(c.is_near(t) for c in changes)]
     false = [t for t in left if t not in duplicates]
     gone = sum(t.kind != "ADDED" for t in false)
+    found = sum(t.arrival == "found" for t in false)
     f1 = 2 * exact / max(1, len(changes) + total)
     return {"changes": len(changes), "exact": exact, "place": place, "duplicates": len(duplicates), "false": len(false),
-            "gone": gone, "F1": f1}
+            "gone": gone, "found": found, "F1": f1}
 
 
-def run(bin_dir, meshes, output, kind, seed):
+def without_masks(lap):
+    bare = lap.parent / "without_masks" / lap.name
+    bare.mkdir(parents=True, exist_ok=True)
+    for name in ("Depth", "poses.txt"):
+        if not (bare / name).exists():
+            (bare / name).symlink_to(lap / name)
+    return bare
+
+
+def run(bin_dir, meshes, output, kind, seed, masks):
     scene = output / f"{kind}_{seed}"
     if not (scene / "truth_objects.txt").exists():
         subprocess.run([bin_dir / "pocd_changed_scene", kind, str(seed), scene] + ([meshes] if kind == "warehouse" else []),
                        check=True)
     config = pathlib.Path(__file__).resolve().parents[2] / "config" / "torwic.yaml"
-    subprocess.run([bin_dir / "pocd_map", "--dataset", "torwic", "--input", scene / "lap_0", "--input", scene / "lap_1",
-                    "--camera", CAMERA, "--config", config, "--output", scene / "run"], check=True,
-                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    return score(scene / "truth_objects.txt", scene / "run" / "events.csv", kind)
+    laps, results, options = [scene / "lap_0", scene / "lap_1"], scene / "run", []
+    if not masks:
+        laps, results = [without_masks(lap) for lap in laps], scene / "run_without_masks"
+        options = ["--set", "classes.without_masks=things"]
+    subprocess.run([bin_dir / "pocd_map", "--dataset", "torwic", "--input", laps[0], "--input", laps[1], "--camera", CAMERA,
+                    "--config", config, *options, "--output", results], check=True, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL)
+    return score(scene / "truth_objects.txt", results / "events.csv", kind)
 
 
 def seeds_of(text):
@@ -138,17 +154,20 @@ def seeds_of(text):
 def text_of(name, scores):
     total = {key: sum(s[key] for s in scores) for key in scores[0]}
     return (f"| {name} | {total['exact']} of {total['changes']} | {total['place']} | {total['duplicates']} | "
-            f"{total['false']} | {total['gone']} | {total['F1'] / len(scores):.3f} |")
+            f"{total['false']} | {total['gone']} | {total['found']} | {total['F1'] / len(scores):.3f} |")
 
 
 def main():
     if len(sys.argv) < 5:
         sys.exit(__doc__)
     bin_dir, meshes, output = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
-    seeds, kinds = seeds_of(sys.argv[4]), sys.argv[5:] or list(SECOND_LAP_S)
-    print("| scene | exact | places | duplicates | false | of these gone | F1 |\n|---|---:|---:|---:|---:|---:|---:|")
+    options = sys.argv[5:]
+    masks = "--no-masks" not in options
+    seeds, kinds = seeds_of(sys.argv[4]), [o for o in options if o != "--no-masks"] or list(SECOND_LAP_S)
+    print("| scene | exact | places | duplicates | false | of these gone | of these found | F1 |\n"
+          "|---|---:|---:|---:|---:|---:|---:|---:|")
     with concurrent.futures.ThreadPoolExecutor(max_workers=2) as pool:
-        runs = {kind: [(seed, pool.submit(run, bin_dir, meshes, output, kind, seed)) for seed in seeds] for kind in kinds}
+        runs = {kind: [(seed, pool.submit(run, bin_dir, meshes, output, kind, seed, masks)) for seed in seeds] for kind in kinds}
         for kind in kinds:
             scores = []
             for seed, result in runs[kind]:
