@@ -18,6 +18,7 @@
 
 #include "pocd_dds/entities/bus_log.hpp"
 #include "pocd_dds/entities/port_files.hpp"
+#include "pocd_dds/entities/receiving_thread.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -128,14 +129,16 @@ class LastingTransport final : public rtps::TransportInterface {
   bool OpenInputChannel(const rtps::Locator& locator, rtps::TransportReceiverInterface* receiver,
                         std::uint32_t size) override {
     const std::lock_guard<std::mutex> lock(input_mutex_);
-    if (!receiving_->OpenInputChannel(locator, receiver, size)) return false;
-    inputs_.push_back({locator, receiver, size, {port_file_id(locator.port), {}, false}});
+    Input input{locator, receiver, size, {}, nullptr};
+    if (!open_input(input)) return false;
+    inputs_.push_back(std::move(input));
     return true;
   }
   bool CloseInputChannel(const rtps::Locator& locator) override {
     const std::lock_guard<std::mutex> lock(input_mutex_);
+    const bool closed = receiving_->CloseInputChannel(locator);
     inputs_.remove_if([&](const Input& input) { return input.locator == locator; });
-    return receiving_->CloseInputChannel(locator);
+    return closed;
   }
   void shutdown() override {
     stop_looking();
@@ -222,6 +225,7 @@ class LastingTransport final : public rtps::TransportInterface {
     rtps::TransportReceiverInterface* receiver;
     std::uint32_t size;
     OpenPort port;
+    std::unique_ptr<ReceivingThread> thread;
   };
   struct Retired {
     std::shared_ptr<Sending> sending;
@@ -310,26 +314,31 @@ class LastingTransport final : public rtps::TransportInterface {
     sending_.swap(next);
     retired_.push_back({std::move(next), Clock::now()});
   }
+  bool open_input(Input& input) {
+    auto thread = std::make_unique<ReceivingThread>(input.receiver);
+    if (!receiving_->OpenInputChannel(input.locator, thread.get(), input.size)) return false;
+    input.thread = std::move(thread);
+    input.port = {port_file_id(input.locator.port), {}, false};
+    return true;
+  }
   void receive_anew() {
     const std::lock_guard<std::mutex> lock(input_mutex_);
     for (Input& input : inputs_) {
       const std::uint32_t port = input.locator.port;
-      if (!input.port.replaced(port, true, [port](std::uint64_t id) {
-            return id != 0 && has_port_file(port, id);
-          })) {
-        continue;
-      }
-      log_warning(
-          "shared memory: port {} of this process was made anew by another one; opens it "
-          "anew to receive",
-          port);
+      const bool turns = input.thread && input.thread->turns();
+      const bool replaced = input.port.replaced(
+          port, true, [port](std::uint64_t id) { return id != 0 && has_port_file(port, id); });
+      if (!turns && !replaced) continue;
+      log_warning("shared memory: {} {}; opens it anew to receive",
+                  turns ? "what a killed process has said last holds up port"
+                        : "another process has made anew port",
+                  port);
       receiving_->CloseInputChannel(input.locator);
-      if (!receiving_->OpenInputChannel(input.locator, input.receiver, input.size)) {
+      input.thread.reset();
+      if (!open_input(input)) {
         log_warning("shared memory: port {} cannot be opened; tried again", port);
         input.port = {};
-        continue;
       }
-      input.port = {port_file_id(port), {}, false};
     }
   }
   void close_retired() {
@@ -348,10 +357,10 @@ class LastingTransport final : public rtps::TransportInterface {
   }
 
   rtps::SharedMemTransportDescriptor settings_;
-  std::shared_ptr<rtps::TransportInterface> receiving_;  // sends, too, until it has to be replaced
   std::mutex input_mutex_;
-  std::list<Input> inputs_;
-  std::mutex mutex_;  // guards these three
+  std::list<Input> inputs_;                              // outlive what receives
+  std::shared_ptr<rtps::TransportInterface> receiving_;  // sends, too, until it has to be replaced
+  std::mutex mutex_;                                     // guards these three
   std::shared_ptr<Sending> sending_;
   bool stopped_ = false;
   std::condition_variable stop_;

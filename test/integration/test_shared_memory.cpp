@@ -7,9 +7,13 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <iostream>
+#include <set>
+#include <thread>
 
 #include "bus_harness.hpp"
 #include "pocd_dds/entities/port_files.hpp"
@@ -42,6 +46,29 @@ class Busy : public eprosima::fastdds::dds::DataReaderListener {
   }
 };
 
+void write(Manifests& manifests) {
+  pocd_msgs::msg::MapManifest manifest;
+  manifests.write(manifest);
+}
+
+/// Is held up by its first sample until it is released, and counts them all.
+class HeldUp : public eprosima::fastdds::dds::DataReaderListener {
+ public:
+  std::atomic<bool> released{false};
+  std::atomic<int> heard{0};
+
+ private:
+  void on_data_available(eprosima::fastdds::dds::DataReader* reader) override {
+    pocd_msgs::msg::MapManifest manifest;
+    eprosima::fastdds::dds::SampleInfo info;
+    while (reader->take_next_sample(&manifest, &info) ==
+           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      ++heard;
+      while (!released) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+};
+
 /// What a test starts as a process of its own: a part of this program, by name.
 std::vector<std::string> part(const std::string& name) {
   return {"/proc/self/exe", "--gtest_also_run_disabled_tests",
@@ -67,6 +94,19 @@ TEST(DISABLED_Process, HearsAManifest) {
   EXPECT_TRUE(eventually([&] { return reader.take(heard, meta); }));
 }
 
+TEST(DISABLED_Process, WritesManifests) {
+  Manifests manifests(
+      std::make_shared<dds::Participant>(dds::BusOptions{dds::default_domain(), "", "writes"}),
+      dds::topics::kMapManifest);
+  for (;;) {
+    if (manifests.matched() > 0) {
+      write(manifests);
+      std::cout << "written" << std::endl;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
 /// Of the first participant of a host; each has two, the second for what is no discovery.
 std::uint32_t first_port(const TestDomain& domain) {  // RTPS 2.2, 9.6.1.1
   return static_cast<std::uint32_t>(7400 + 250 * domain.number() + 10);
@@ -82,11 +122,6 @@ std::size_t deleted_ports() {
     count += line.find("(deleted)") != std::string::npos;
   }
   return count;
-}
-
-void write(Manifests& manifests) {
-  pocd_msgs::msg::MapManifest manifest;
-  manifests.write(manifest);
 }
 
 TEST(SharedMemory, WhoTakesThePortOfAKilledReceiverIsHeard) {
@@ -111,6 +146,46 @@ TEST(SharedMemory, WhoTakesThePortOfAKilledReceiverIsHeard) {
     return !next.running();
   }));
   EXPECT_EQ(next.wait().exit_code, 0);
+}
+
+/// Segments that participants of this host send from.
+std::set<std::string> segments() {
+  std::set<std::string> names;
+  for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
+    const std::string name = file.path().filename().string();
+    const bool of_a_port = name.find("_port") != std::string::npos;
+    if (name.find("fastrtps_") == 0 && name.find("_el") == std::string::npos && !of_a_port)
+      names.insert(name);
+  }
+  return names;
+}
+
+// What a killed sender has said last is still in the port when its memory has been given up.
+TEST(SharedMemory, AReceiverThatWasHeldUpWhenASenderWasKilledHearsOthers) {
+  if (!own_shared_memory().empty()) GTEST_SKIP() << own_shared_memory();
+  const TestDomain domain;
+  setenv("ROS_DOMAIN_ID", domain.text().c_str(), 1);
+  const auto receiver = test_participant(domain);
+  const dds::TopicSpec& spec = dds::topics::kMapManifest;
+  const auto topic = receiver->topic(
+      spec.name, eprosima::fastdds::dds::TypeSupport(new pocd_msgs::msg::MapManifestPubSubType));
+  HeldUp held_up;
+  auto* const reader = receiver->subscriber()->create_datareader(
+      topic.get(), receiver->reader_qos(spec.name, spec.delivery), &held_up);
+  const std::set<std::string> before = segments();
+  {
+    Process sender(part("WritesManifests"));
+    ASSERT_TRUE(eventually([&] { return held_up.heard == 1; })) << sender.err();
+    const std::size_t written = count_of(sender.out(), "written");
+    ASSERT_TRUE(eventually([&] { return count_of(sender.out(), "written") > written + 5; }));
+    EXPECT_GT(segments().size(), before.size());
+    // Killed here.
+  }
+  EXPECT_TRUE(eventually([&] { return segments() == before; }));
+  held_up.released = true;
+  Process next(part("WritesManifests"));
+  EXPECT_TRUE(eventually([&] { return held_up.heard > 50; })) << next.err();
+  receiver->subscriber()->delete_datareader(reader);
 }
 
 TEST(SharedMemory, AReceiverWhosePortWasMadeAnewByOthersListensThere) {

@@ -1,0 +1,71 @@
+// Whether a thread that receives from shared memory works without receiving anything.
+#pragma once
+
+#include <fastdds/rtps/transport/TransportReceiverInterface.h>
+#include <pthread.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <ctime>
+
+namespace pocd::dds {
+
+/// Stands between a port of shared memory and who receives from it.
+///
+/// A message in a port only names the segment of its sender. Fast DDS 2.9.1 gives up the segments
+/// of a process that was killed after some seconds. Who was held up meanwhile finds a message of
+/// that process, cannot open its segment, and asks for the same message again, without an end: the
+/// thread uses a processor and receives nothing more (ros2cli #582, Fast-DDS #2398).
+class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverInterface {
+ public:
+  using Octet = eprosima::fastrtps::rtps::octet;
+  using Locator = eprosima::fastrtps::rtps::Locator_t;
+
+  explicit ReceivingThread(TransportReceiverInterface* next) : next_(next) {}
+
+  void OnDataReceived(const Octet* data, const std::uint32_t size, const Locator& local,
+                      const Locator& remote) override {
+    if (!known_) {
+      known_ = pthread_getcpuclockid(pthread_self(), &clock_) == 0;
+    }
+    within_ = true;
+    next_->OnDataReceived(data, size, local, remote);
+    ++received_;
+    within_ = false;
+  }
+
+  /// To be asked once a second, by one thread: true when it has worked since the last two calls and
+  /// received nothing.
+  bool turns() {
+    const std::uint64_t received = received_;
+    const std::chrono::nanoseconds worked = processor_time();
+    const bool idle = within_ || received != last_received_ || worked - last_worked_ < kWork;
+    last_received_ = received;
+    last_worked_ = worked;
+    looks_ = idle ? 0 : looks_ + 1;
+    return looks_ >= kLooks;
+  }
+
+ private:
+  /// One that waits uses next to nothing; of a busy machine, one that turns gets a part.
+  static constexpr std::chrono::milliseconds kWork{50};
+  static constexpr int kLooks = 3;
+
+  std::chrono::nanoseconds processor_time() const {
+    std::timespec time{};
+    if (!known_ || clock_gettime(clock_, &time) != 0) return {};
+    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+  }
+
+  TransportReceiverInterface* const next_;
+  clockid_t clock_{};  // of the thread; written before it is known
+  std::atomic<bool> known_{false}, within_{false};
+  std::atomic<std::uint64_t> received_{0};
+  // Of who asks.
+  std::uint64_t last_received_ = 0;
+  std::chrono::nanoseconds last_worked_{};
+  int looks_ = 0;
+};
+
+}  // namespace pocd::dds
