@@ -112,6 +112,9 @@ void ObjectTracker::join_sides(Step& step) {
     if (!anew) continue;
     object->visit_ns = step.frame.stamp_ns;
     if (!one_look) rows_end.push_back(id);
+    // Of what geometry alone tells, looks of one visit count: a post at the edge of view is seen
+    // once or twice on each.
+    if (!one_look && !object->confirmed && object->class_id == kThing) object->observations = 0;
     if (object->confirmed) visited.push_back(id);
   }
   for (const ObjectId id : visited) {

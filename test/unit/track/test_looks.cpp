@@ -37,6 +37,27 @@ TEST(Looks, AThingInPiecesIsSeenOncePerFrame) {
   }
 }
 
+// At the edge of view a post of a shelf is seen once or twice on each visit.
+TEST(Looks, OfWhatHasNoClassThoseOfOneVisitCount) {
+  const int needed = StateConfig().confirm_observations;
+  for (const bool has_class : {true, false}) {
+    TrackerRig rig;
+    const auto edit = [&](test::Segmented& s) {
+      for (Observation& o : s.observations.list) {
+        if (o.class_id == kBoxClass && !has_class) o.class_id = kThing;
+      }
+    };
+    const auto visit = [&](int looks) {
+      rig.look(room_with({kBox}), edit, 60.0);
+      rig.look_times(looks - 1, room_with({kBox}), edit);
+    };
+    for (int visits = 0; visits < 3; ++visits) visit(needed - 1);
+    EXPECT_EQ(rig.count(EventKind::kAdded), has_class ? 1u : 0u) << rig.told();
+    visit(needed);
+    EXPECT_EQ(rig.count(EventKind::kAdded), 1u) << rig.told();
+  }
+}
+
 /// Two boxes that touch: one piece in the image, unless masks or the view tell them apart.
 class Companions : public ::testing::Test {
  protected:

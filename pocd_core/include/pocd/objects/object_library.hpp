@@ -52,7 +52,7 @@ struct LibraryObject {
   std::string last_robot;
   std::set<std::string> seen_by;  ///< robots that have observed it
   Moment moment;                  ///< the last one
-  std::uint32_t observations = 0;
+  std::uint32_t observations = 0;  ///< of a candidate without a class: on this visit
 
   // Where it is in its life.
   bool confirmed = false;           ///< false: tentative, known to nobody outside
