@@ -50,8 +50,8 @@ struct LibraryObject {
   StampNs placed_ns = 0;    ///< since when it is known where it is: first seen, or moved, then
   StampNs in_place_ns = 0;  ///< the last look that found it in its place
   std::string last_robot;
-  std::set<std::string> seen_by;  ///< robots that have observed it
-  Moment moment;                  ///< the last one
+  std::set<std::string> seen_by;   ///< robots that have observed it
+  Moment moment;                   ///< the last one
   std::uint32_t observations = 0;  ///< of a candidate without a class: on this visit
 
   // Where it is in its life.
