@@ -11,7 +11,8 @@
 
 namespace pocd::dds {
 
-/// Stands between a port of shared memory and who receives from it.
+/// Stands between a port of shared memory and who receives from it. Each channel that is opened
+/// needs a new one. turns() may be called beside OnDataReceived.
 ///
 /// A message in a port only names the segment of its sender. Fast DDS 2.9.1 gives up the segments
 /// of a process that was killed after some seconds. Who was held up meanwhile finds a message of
@@ -35,8 +36,8 @@ class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverI
     within_ = false;
   }
 
-  /// To be asked once a second, by one thread: true when it has worked since the last two calls and
-  /// received nothing.
+  /// To be asked once a second, by one thread: true from the third call in a row on of which each
+  /// finds that it has worked since the call before and received nothing.
   bool turns() {
     const std::uint64_t received = received_;
     const std::chrono::nanoseconds worked = processor_time();

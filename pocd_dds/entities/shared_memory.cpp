@@ -1,10 +1,7 @@
 #include "pocd_dds/entities/shared_memory.hpp"
 
 #include <fastdds/rtps/transport/TransportInterface.h>
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -17,6 +14,7 @@
 #include <vector>
 
 #include "pocd_dds/entities/bus_log.hpp"
+#include "pocd_dds/entities/one_at_a_time.hpp"
 #include "pocd_dds/entities/port_files.hpp"
 #include "pocd_dds/entities/receiving_thread.hpp"
 
@@ -36,27 +34,6 @@ constexpr std::chrono::seconds kInFlight{10};
 constexpr std::chrono::seconds kRetry{60};
 /// Ports of 52 KB and locks, beside the segment.
 constexpr std::uint64_t kBeside = 1u << 20;
-
-/// Two processes that start at once must not both take the room that is there for one.
-class OneAtATime {
- public:
-  explicit OneAtATime(const std::filesystem::path& folder)
-      : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    // Not for ever: one that stands still would hold up all others.
-    for (int i = 0; i < 200 && descriptor_ >= 0 && flock(descriptor_, LOCK_EX | LOCK_NB) != 0;
-         ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-  }
-  ~OneAtATime() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  OneAtATime(const OneAtATime&) = delete;
-  OneAtATime& operator=(const OneAtATime&) = delete;
-
- private:
-  int descriptor_;
-};
 
 /// Over a list of its own, in place of the participant's.
 class Destinations final : public rtps::LocatorsIterator {

@@ -6,10 +6,10 @@ nothing. A true change is
   exact     when there is a net change of its kind with its places: a box's middle lies in the true footprint, grown
             by 0.35 m (the old one for REMOVED, the new one for ADDED, both for MOVED);
   in place  also when it is told as another kind there: a move as REMOVED and ADDED, or one of the two.
-Further net changes within 0.5 m of a true change's footprint are duplicates, all others are false; of these, what is told
-as ADDED with the arrival `found` was seen for the first time, and not said to have come. What nobody could see is not asked. F1 is that of exact changes: 2 exact / (true changes + told ones).
-By hand, not a test.
-With --no-masks the segmentation images are left out.
+Further net changes within 0.5 m of a true change's footprint are duplicates, all others are false. A false ADDED with the
+arrival `found` is a thing that was seen for the first time; it is not said to have come. What nobody could see is not
+asked. F1 is that of exact changes: 2 exact / (true changes + told ones).
+With --no-masks the segmentation images are left out. By hand, not a test.
 usage: changed_scenes.py BIN_DIR MESH_DIR OUTPUT_DIR SEEDS [--no-masks] [KIND...]   (SEEDS: 1-8 or 1,5,9; KIND: circuit,
 warehouse)
 """

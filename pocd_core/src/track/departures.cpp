@@ -12,9 +12,11 @@ bool Departures::add(Departure departure) {
   return false;
 }
 
-void Departures::add_move(const Move& move) {
+bool Departures::add_move(const Move& move) {
   moves_.push_back(move);
-  if (moves_.size() > kMost) moves_.pop_front();
+  if (moves_.size() <= kMost) return true;
+  moves_.pop_front();
+  return false;
 }
 
 const std::deque<Departure>& Departures::recent(StampNs now_ns, double window_s) {

@@ -242,6 +242,13 @@ void ObjectTracker::keep(Departure departure, FrameResult& result) {
                             "be a new thing where it is found again");
 }
 
+void ObjectTracker::keep(const Move& move, FrameResult& result) {
+  if (departures_.add_move(move)) return;
+  result.warnings.push_back("more than " + std::to_string(Departures::kMost) +
+                            " things moved within state.relocation_window_s: a side of the oldest "
+                            "would be a thing of its own");
+}
+
 bool ObjectTracker::find_origin(Step& step, LibraryObject& object) {
   const Departure* best = nullptr;
   Motion motion;
@@ -345,7 +352,7 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   event.first_gone_ns = from.first_gone_ns;
   move.from = before;
   step.moves.push_back(move);
-  departures_.add_move(move);
+  keep(move, step.result);
 }
 
 }  // namespace pocd

@@ -175,7 +175,7 @@ void ObjectTracker::move_displaced(Step& step, Look& look) {
   object.reported_box = object.box;
   object.lost = 0;
   step.moves.push_back(move);
-  departures_.add_move(move);
+  keep(move, step.result);
 }
 
 Moment& ObjectTracker::moment_of(Step& step, LibraryObject& object) {

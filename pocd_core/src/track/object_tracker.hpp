@@ -131,6 +131,7 @@ class ObjectTracker {
   /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
   void depart(Step& step, Departure departure, Rule rule);
   void keep(Departure departure, FrameResult& result);
+  void keep(const Move& move, FrameResult& result);
   void confirm(Step& step, LibraryObject& object);
   /// Reports the object as moved when it is one that departed; false when there is none.
   bool find_origin(Step& step, LibraryObject& object);

@@ -106,6 +106,14 @@ class Drive {
   std::uint64_t count_ = 0;
 };
 
+inline const Eigen::Vector3d kSize(0.6, 0.4, 0.6);
+inline constexpr int kLearn = 25;  // frames: more than half of the sway, so that sides are seen
+/// Within a second of a camera at 15 Hz a change in full view must be reported.
+inline constexpr int kPromptly = 15;
+
+inline SceneObject left_box() { return solid(kBoxClass, {-0.6, 2.3}, kSize); }
+inline SceneObject right_cage() { return solid(kCageClass, {0.7, 2.4}, {0.5, 0.5, 0.8}, 0.3); }
+
 /// Drawn as a class of its own; masks_of_instances() says that it is a box.
 inline constexpr ClassId kSecondBox = 50;
 

@@ -9,16 +9,14 @@ namespace {
 using test::Drive;
 using test::kBoxClass;
 using test::kCageClass;
+using test::left_box;
+using test::right_cage;
 using test::room_with;
-using test::solid;
-
-SceneObject box() { return solid(kBoxClass, {-0.6, 2.3}, {0.6, 0.4, 0.6}); }
-SceneObject cage() { return solid(kCageClass, {0.7, 2.4}, {0.5, 0.5, 0.8}, 0.3); }
 
 TEST(PipelineArrival, WhatStoodThereIsFoundAndWhatCameArrived) {
   Drive drive;
-  drive.watch(room_with({box()}), 25);
-  drive.watch(room_with({box(), cage()}), 25);
+  drive.watch(room_with({left_box()}), 25);
+  drive.watch(room_with({left_box(), right_cage()}), 25);
   const auto added = drive.of_kind(EventKind::kAdded);
   ASSERT_EQ(added.size(), 2u) << test::text(drive.events());
   EXPECT_EQ(added[0].class_id, kBoxClass);
@@ -30,7 +28,7 @@ TEST(PipelineArrival, WhatStoodThereIsFoundAndWhatCameArrived) {
 TEST(PipelineArrival, OnlyAddedHasOne) {
   Drive drive;
   drive.watch(room_with({}), 25);
-  drive.watch(room_with({box()}), 25);
+  drive.watch(room_with({left_box()}), 25);
   drive.watch(room_with({}), 25);
   const auto removed = drive.of_kind(EventKind::kRemoved);
   ASSERT_EQ(removed.size(), 1u) << test::text(drive.events());

@@ -11,17 +11,14 @@ namespace {
 using test::Drive;
 using test::kBoxClass;
 using test::kCageClass;
+using test::kLearn;
+using test::kPromptly;
+using test::kSize;
+using test::left_box;
+using test::right_cage;
 using test::room_with;
 using test::solid;
 using test::text;
-
-const Eigen::Vector3d kSize(0.6, 0.4, 0.6);
-constexpr int kLearn = 25;  // frames: more than half of the sway, so that sides are seen
-/// Within a second of a camera at 15 Hz a change in full view must be reported.
-constexpr int kPromptly = 15;
-
-SceneObject left_box() { return solid(kBoxClass, {-0.6, 2.3}, kSize); }
-SceneObject right_cage() { return solid(kCageClass, {0.7, 2.4}, {0.5, 0.5, 0.8}, 0.3); }
 
 // A replay that starts again: what is known is known from before, and its changes are found as if
 // the clocks had gone on.

@@ -14,14 +14,12 @@ using test::kCageClass;
 using test::kFenceAlias;
 using test::kFenceClass;
 using test::kPersonClass;
+using test::left_box;
+using test::right_cage;
 using test::room_with;
 using test::solid;
 using test::text;
 
-const Eigen::Vector3d kSize(0.6, 0.4, 0.6);
-
-SceneObject left_box() { return solid(kBoxClass, {-0.6, 2.3}, kSize); }
-SceneObject right_cage() { return solid(kCageClass, {0.7, 2.4}, {0.5, 0.5, 0.8}, 0.3); }
 Scene furnished() { return room_with({left_box(), right_cage()}); }
 
 void expect_nothing_removed_or_moved(const Drive& drive) {

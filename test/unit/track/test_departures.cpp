@@ -123,11 +123,11 @@ TEST(Departures, MoreThanTheMostAreNotKeptWhateverTheStamps) {
   for (std::uint32_t i = 1; i <= Departures::kMost; ++i) {
     ASSERT_TRUE(departures.add(departed(i, 5 * kSecond))) << i;
     move.id = ObjectId{i};
-    departures.add_move(move);
+    ASSERT_TRUE(departures.add_move(move)) << i;
   }
   EXPECT_FALSE(departures.add(departed(7777, 4 * kSecond)));
   move.id = ObjectId{7777};
-  departures.add_move(move);
+  EXPECT_FALSE(departures.add_move(move));
   const auto& kept = departures.recent(5 * kSecond, 60.0);
   EXPECT_EQ(kept.size(), Departures::kMost);
   EXPECT_EQ(kept.front().id, ObjectId{2}) << "the oldest goes";

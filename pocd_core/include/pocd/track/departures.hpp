@@ -56,7 +56,7 @@ class Departures {
   /// each is compared with all that arrives, and written with every step of a memory.
   static constexpr std::size_t kMost = 500;
 
-  /// False when the oldest had to go for it.
+  /// These two return false when the oldest had to go for the new one.
   bool add(Departure departure);
   /// Those within `window_s` before `now_ns`; older ones are forgotten. Valid until the next call.
   const std::deque<Departure>& recent(StampNs now_ns, double window_s);
@@ -65,7 +65,7 @@ class Departures {
   /// Those whose box has its middle [m, W] where `inside` accepts it.
   void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
   void set_asked_far(ObjectId id);
-  void add_move(const Move& move);
+  bool add_move(const Move& move);
   /// As recent().
   const std::deque<Move>& recent_moves(StampNs now_ns, double window_s);
   /// The clock that was at `newest_ns` goes on from `latest_ns`: nothing that is kept happened
