@@ -14,7 +14,7 @@
 
 namespace pocd::memory {
 
-constexpr int kFileVersion = 2;
+constexpr int kFileVersion = 3;
 constexpr std::int64_t kApplicationId = 0x504F4344;  // "POCD"
 constexpr const char* kFileName = "memory.sqlite";
 

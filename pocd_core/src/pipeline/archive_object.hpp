@@ -134,8 +134,15 @@ void archive(Archive& a, Departure& departure) {
 
 template <class Archive>
 void archive(Archive& a, Move& move) {
-  auto& [id, class_id, from, T_new_old, in_place_ns, moved_ns] = move;
-  a(id, class_id, from, T_new_old, in_place_ns, moved_ns);
+  auto& [id, class_id, from, T_new_old, in_place_ns, moved_ns, left, first_seen_there_ns,
+         surfels_there] = move;
+  a(id, class_id, from, T_new_old, in_place_ns, moved_ns, first_seen_there_ns, surfels_there);
+  Departure departure = left ? *left : Departure{};
+  a(departure);
+  if constexpr (Archive::kLoads) {
+    if (departure.id != ObjectId::kNone)
+      left = std::make_shared<const Departure>(std::move(departure));
+  }
 }
 
 }  // namespace pocd

@@ -31,6 +31,18 @@ const std::deque<Move>& Departures::recent_moves(StampNs now_ns, double window_s
   return moves_;
 }
 
+Move* Departures::last_move_of(ObjectId id) {
+  const auto last =
+      std::find_if(moves_.rbegin(), moves_.rend(), [&](const Move& m) { return m.id == id; });
+  return last == moves_.rend() ? nullptr : &*last;
+}
+
+void Departures::forget_moves_of(ObjectId id) {
+  moves_.erase(
+      std::remove_if(moves_.begin(), moves_.end(), [&](const Move& m) { return m.id == id; }),
+      moves_.end());
+}
+
 bool Departures::has(ObjectId id) const {
   return std::any_of(list_.begin(), list_.end(), [&](const Departure& d) { return d.id == id; });
 }
@@ -58,14 +70,20 @@ void Departures::set_asked_far(ObjectId id) {
 
 void Departures::set_clock_back(StampNs newest_ns, StampNs latest_ns) {
   const StampNs back_ns = newest_ns - latest_ns;
-  for (Departure& d : list_) {
+  const auto set_back = [&](Departure& d) {
     for (StampNs* stamp_ns : {&d.first_seen_ns, &d.in_place_ns, &d.first_gone_ns})
       *stamp_ns = std::min(*stamp_ns, latest_ns);
     d.departed_ns -= back_ns;
-  }
+  };
+  for (Departure& d : list_) set_back(d);
   for (Move& m : moves_) {
     m.in_place_ns = std::min(m.in_place_ns, latest_ns);
+    m.first_seen_there_ns = std::min(m.first_seen_there_ns, latest_ns);
     m.moved_ns -= back_ns;
+    if (!m.left) continue;
+    Departure left = *m.left;
+    set_back(left);
+    m.left = std::make_shared<const Departure>(std::move(left));
   }
 }
 

@@ -166,6 +166,9 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   // Both were seen in the same looks, for the most part.
   survivor.observations = std::max(survivor.observations, absorbed.observations);
   survivor.seen_by.insert(absorbed.seen_by.begin(), absorbed.seen_by.end());
+  // What arrived is no side of what stood there: all of it arrived.
+  if (survivor.arrival == Arrival::kUnknown && absorbed.arrival == Arrival::kArrived)
+    survivor.arrival = Arrival::kArrived;
   survivor.in_place_ns = std::max(survivor.in_place_ns, absorbed.in_place_ns);
   survivor.last_seen_ns = std::max(survivor.last_seen_ns, absorbed.last_seen_ns);
   survivor.companions.clear();

@@ -65,6 +65,7 @@ void ObjectTracker::report_changes(Step& step) {
     object->reported_box = object->box;
     object->lost = 0;
   }
+  ask_moves_again(step, touched);
   // Grows while it is worked on.
   for (std::size_t i = 0; i < step.moves.size(); ++i) gather_sides(step, step.moves[i]);
   // Those above, and what was found out about others meanwhile.

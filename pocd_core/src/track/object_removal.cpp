@@ -174,13 +174,15 @@ void ObjectTracker::lose_part(Step& step, LibraryObject& object,
   object.icp_target.reset();
   object.lost += lost.size();
   mark_changed(object);
-  for (std::size_t n = 0; n < step.look_count; ++n) {
-    if (looks_[n].object == &object) looks_[n].sighting.sights.clear();
-  }
+  forget_sights(step, object);
   if (!object.model.surfels().empty()) refit_box(step, object);
   const bool is_part = object.confirmed && piece >= 2 * least_surfels() &&
                        static_cast<double>(piece) >= kPartShare * static_cast<double>(before);
   if (!is_part) return;
+  // What was never measured where the thing is now did not leave: the thing went another way.
+  const auto here = std::count_if(
+      lost.begin(), lost.end(), [&](const Surfel& s) { return s.last_hit_ns >= object.placed_ns; });
+  if (object.moved && 2 * static_cast<std::size_t>(here) < lost.size()) return;
   const double voxel_m = config_.map.voxel_size_m, band_m = 2.0 * config_.map.truncation_m();
   const auto gone = std::make_shared<const IcpTarget>(icp_target(lost, voxel_m, band_m));
   const auto standing =
@@ -347,9 +349,6 @@ void ObjectTracker::remove(Step& step, LibraryObject& object, Rule rule) {
     clear_gone(step, object.id, [](const Eigen::Vector3d&) { return true; });
   step.edits.reassign(object.id, ObjectId::kNone);  // what stays is not of it
   std::replace(step.owners.begin(), step.owners.end(), object.id, ObjectId::kNone);
-  for (std::size_t n = 0; n < step.look_count; ++n) {
-    if (looks_[n].object == &object) looks_[n].sighting.sights.clear();
-  }
   const ObjectId id = object.id;
   for (std::size_t n = 0; n < step.look_count; ++n) {
     if (looks_[n].object != &object) continue;

@@ -149,8 +149,13 @@ bool ObjectTracker::lasts(const Step& step, StampNs since_ns) const {
 void ObjectTracker::move_displaced(Step& step, Look& look) {
   LibraryObject& object = *look.object;
   const OrientedBox previous_box = object.box;
-  const Move move{object.id,      object.class_id,    previous_box,
-                  look.T_new_old, object.in_place_ns, step.frame.stamp_ns};
+  Move move;
+  move.id = object.id;
+  move.class_id = object.class_id;
+  move.from = previous_box;
+  move.T_new_old = look.T_new_old;
+  move.in_place_ns = object.in_place_ns;
+  move.moved_ns = step.frame.stamp_ns;
   object.looks_displaced = 0;
   object.model.transform(look.T_new_old);
   for (Surfel& s : object.model.surfels()) s.seen_through = 0;
@@ -295,7 +300,7 @@ LibraryObject& ObjectTracker::create(Step& step, ClassId class_id) {
   return object;
 }
 
-void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
+std::optional<OrientedBox> ObjectTracker::fit(const Step& step, LibraryObject& object) const {
   Points points, normals;
   points.reserve(object.model.surfels().size());
   normals.reserve(object.model.surfels().size());
@@ -311,7 +316,7 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
       normals.push_back(s.normal_W);
     }
   }
-  if (points.empty()) return;
+  if (points.empty()) return std::nullopt;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const auto& p : points) sum += p.cast<double>();
   object.centroid_W = sum / static_cast<double>(points.size());
@@ -328,8 +333,20 @@ void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
       box.pose.position_W.z() = 0.5 * (top + ground_m);
     }
   }
+  return box;
+}
+
+void ObjectTracker::refit_box(Step& step, LibraryObject& object) {
+  const auto box = fit(step, object);
+  if (!box) return;
   object.box_surfels = object.model.surfels().size();
-  library_.place(object, box);
+  library_.place(object, *box);
+}
+
+void ObjectTracker::forget_sights(Step& step, const LibraryObject& object) {
+  for (std::size_t n = 0; n < step.look_count; ++n) {
+    if (looks_[n].object == &object) looks_[n].sighting.sights.clear();
+  }
 }
 
 Arrival ObjectTracker::arrival_of(const LibraryObject& object) const {

@@ -92,8 +92,12 @@ class ObjectTracker {
   LibraryObject& create(Step& step, ClassId class_id);
   /// What was known of the space behind the object, from its surfel `from` on, is known no more.
   void hide_space_behind(Step& step, const LibraryObject& object, std::size_t from);
+  /// Sets the middle of the object's surface, and returns the box around it; nothing of no surface.
+  std::optional<OrientedBox> fit(const Step& step, LibraryObject& object) const;
   void refit_box(Step& step, LibraryObject& object);
   void absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed);
+  /// The object's surfels are listed elsewhere from now on.
+  void forget_sights(Step& step, const LibraryObject& object);
   /// Makes one of two known objects; the older one goes on.
   void join(Step& step, LibraryObject& a, LibraryObject& b);
   /// Whether what is known of two objects allows that they are one.
@@ -130,6 +134,7 @@ class ObjectTracker {
   void remove(Step& step, LibraryObject& object, Rule rule);
   /// What left, and where it may be now: reported as MOVED when it is found, else as REMOVED.
   void depart(Step& step, Departure departure, Rule rule);
+  void report_gone(Step& step, Departure departure, Rule rule);
   void keep(Departure departure, FrameResult& result);
   void keep(const Move& move, FrameResult& result);
   void confirm(Step& step, LibraryObject& object);
@@ -140,6 +145,15 @@ class ObjectTracker {
   /// The motion that took what departed to `found` [m, W]; nothing when they are two things.
   std::optional<Motion> motion_of(const Step& step, const Departure& departure,
                                   const LibraryObject& found) const;
+  /// Whether it was asked before: a thing that was found may be larger than what was known of it,
+  /// as more of it is seen.
+  enum class Asked { kFirst, kAgain };
+  /// All motions that may have.
+  std::vector<Motion> motions_of(const Step& step, const Departure& departure,
+                                 const LibraryObject& found, Asked asked) const;
+  /// The one of them that did; nothing when too little is known. `arrival`: of the found one.
+  static std::optional<Motion> likeliest(const std::vector<Motion>& motions,
+                                         const Departure& departure, Arrival arrival);
   /// The same by one alignment of the found surface `source` with what departed, `target`; nothing
   /// when what was seen speaks against it.
   std::optional<Motion> explanation(const Step& step, const Departure& departure,
@@ -153,6 +167,17 @@ class ObjectTracker {
   void find_far_moves(Step& step);
   void report_move(Step& step, LibraryObject& found, const Departure& from, const Pose& T_new_old,
                    Rule rule);
+  /// What is known of the other sides of what departed, where the motion took them [m, W], but for
+  /// those whose place was seen empty.
+  std::vector<Surfel> other_sides(const Step& step, const Departure& departure,
+                                  const Pose& T_new_old) const;
+  /// Of things that moved, of which more was seen since: the motion is corrected, or taken back.
+  void ask_moves_again(Step& step, const std::vector<ObjectId>& touched);
+  /// What moved has gone another way than was told. `there`: what was measured at the new place.
+  void correct(Step& step, LibraryObject& object, const ObjectModel& there, Move& move,
+               const Pose& T_new_old);
+  /// What is said to have moved is another thing: the one is gone, and the other one is new.
+  void take_back(Step& step, LibraryObject& object, const LibraryObject& there);
   enum class Along {
     kNo,      ///< the motion does not explain what departed
     kJoined,  ///< it was a side of the thing that moved, and is of it now

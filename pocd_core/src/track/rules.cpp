@@ -17,6 +17,7 @@ const std::vector<RuleInfo>& all_rules() {
       {Rule::kStationarityBelowThreshold, "stationarity_below_threshold", {kRemoved, kMoved}},
       {Rule::kNothingLeft, "nothing_left", {kRemoved, kMoved}},
       {Rule::kPartSeenThrough, "part_seen_through", {kRemoved, kMoved}},
+      {Rule::kAnotherThing, "another_thing", {kRemoved}},
       {Rule::kFoundAgain, "found_again", {kMoved}},
       {Rule::kMovedAlike, "moved_alike", {kMoved}},
       {Rule::kAlignedElsewhere, "aligned_elsewhere", {kMoved}},

@@ -43,6 +43,9 @@ struct PixelView {
 std::optional<PixelView> view_of(const OrganizedCloud& cloud, const Pose& T_C_W,
                                  const Eigen::Vector3d& point_W);
 
+/// Where a box was before a motion.
+OrientedBox box_before(const OrientedBox& box, const Pose& T_new_old);
+
 /// The surfels after a motion [m, W]; none of them has been seen through there.
 std::vector<Surfel> moved_surfels(const std::vector<Surfel>& surfels, const Pose& T_new_old);
 

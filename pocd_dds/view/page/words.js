@@ -23,6 +23,7 @@ export function durationText(s) {
 const rules = {
   stationarity_below_threshold: "the belief that it stays where it is fell below the threshold",
   nothing_left: "nearly all of its surface was seen to be gone",
+  another_thing: "what was said to be it at a new place is another thing",
   found_again: "an object that had gone was found again here",
   moved_alike: "it went the way that a thing beside it went",
   aligned_elsewhere: "its surface fits at another place",

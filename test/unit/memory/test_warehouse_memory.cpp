@@ -70,7 +70,7 @@ TEST(WarehouseMemory, AFileOfAnotherVersionIsRefusedByNumber) {
     memory::Database database(folder / "memory/memory.sqlite", memory::Database::Access::kWrite);
     database.execute("PRAGMA user_version = 9");
   }
-  expect_error(folder / "memory", "memory of version 9, this program knows version 2");
+  expect_error(folder / "memory", "memory of version 9, this program knows version 3");
 }
 
 TEST(WarehouseMemory, StatesOfAnotherPipelineAreRefusedByNumber) {

@@ -71,6 +71,23 @@ TEST(Departures, MovesAreKeptForTheWindowToo) {
   EXPECT_TRUE(departures.recent_moves(101 * kSecond, 60.0).empty()) << "as if it had gone on";
 }
 
+TEST(Departures, TheLastMoveOfAThingIsFoundUntilItIsForgotten) {
+  Departures departures;
+  Move move;
+  move.id = ObjectId{7};
+  for (const StampNs moved_ns : {1, 2}) {
+    move.moved_ns = moved_ns;
+    departures.add_move(move);
+  }
+  move.id = ObjectId{8};
+  departures.add_move(move);
+  ASSERT_NE(departures.last_move_of(ObjectId{7}), nullptr);
+  EXPECT_EQ(departures.last_move_of(ObjectId{7})->moved_ns, 2);
+  departures.forget_moves_of(ObjectId{7});
+  EXPECT_EQ(departures.last_move_of(ObjectId{7}), nullptr);
+  EXPECT_NE(departures.last_move_of(ObjectId{8}), nullptr);
+}
+
 TEST(Motion, OfThoseThatExplainTheSameTheShortestIsLikeliest) {
   Motion near, far, partly;
   near.fit = far.fit = partly.fit = 1.0;

@@ -8,6 +8,7 @@ namespace {
 
 using test::kBoxClass;
 using test::kCageClass;
+using test::kPersonClass;
 using test::room_with;
 using test::solid;
 using test::TrackerRig;
@@ -205,6 +206,22 @@ TEST(Found, AThingOfWhichOnlyAPartWasKnownMovesAsAWhole) {
   EXPECT_EQ(rig.count(EventKind::kMoved), 1u) << rig.told();
   ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
   EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, id);
+}
+
+// A pole before it shows it in two pieces. Of the place of one of them, most was hidden before.
+TEST(Found, WhatIsJoinedWithAPartThatArrivedHasArrived) {
+  const SceneObject pole = solid(kPersonClass, {0.25, 1.6}, {0.19, 0.05, 1.6});
+  const SceneObject box = solid(kBoxClass, {0.325, 2.25}, {0.65, 0.3, 0.8});
+  TrackerRig rig;
+  rig.look_times(20, room_with({solid(kPersonClass, {0.04, 1.6}, {0.09, 0.05, 1.6}), pole}));
+  rig.look(room_with({box, pole}), {}, 60.0);
+  rig.look_times(10, room_with({box, pole}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->arrival, Arrival::kUnknown);
+  EXPECT_EQ(rig.of_class(kBoxClass)[1]->arrival, Arrival::kArrived);
+  rig.look_times(20, room_with({box}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->arrival, Arrival::kArrived);
 }
 
 // Of four times its length, behind what hid the place: nobody saw that it was empty before.

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <functional>
+#include <memory>
 
 #include "pocd/objects/object_library.hpp"
 
@@ -47,6 +48,11 @@ struct Move {
   Pose T_new_old = Pose::Identity();
   StampNs in_place_ns = 0;  ///< last seen at its old place
   StampNs moved_ns = 0;     ///< found at the new one; as Departure::departed_ns
+  /// What left the old place, and when the first of it was seen at the new one; null of what was
+  /// seen beside its place all the time.
+  std::shared_ptr<const Departure> left;
+  StampNs first_seen_there_ns = 0;
+  std::size_t surfels_there = 0;  ///< measured there when it was asked last whether it moved
 };
 
 /// Departures and moves within a window of time, oldest first. Not thread-safe.
@@ -68,6 +74,9 @@ class Departures {
   bool add_move(const Move& move);
   /// As recent().
   const std::deque<Move>& recent_moves(StampNs now_ns, double window_s);
+  /// The last one of the object, or null. Valid until the next call.
+  Move* last_move_of(ObjectId id);
+  void forget_moves_of(ObjectId id);
   /// The clock that was at `newest_ns` goes on from `latest_ns`: nothing that is kept happened
   /// later, and all of it stays as old as it is. A replay that starts again and again would keep
   /// it for ever otherwise.

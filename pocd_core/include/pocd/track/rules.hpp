@@ -24,6 +24,8 @@ enum class Rule : std::uint8_t {
   kStationarityBelowThreshold,
   kNothingLeft,
   kPartSeenThrough,
+  // REMOVED, after a MOVED.
+  kAnotherThing,
   // MOVED.
   kFoundAgain,
   kMovedAlike,
