@@ -167,6 +167,30 @@ TEST(Found, WhatGrewOntoAKnownThingIsASideOfIt) {
   EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
 }
 
+// As a robot passes it: its middle is seen last, on the same visit or on the next one.
+TEST(Found, AThingOfWhichOneEndAndThenTheOtherWasSeenIsOne) {
+  const Scene scene = room_with({solid(kBoxClass, {0.0, 2.4}, {1.8, 0.3, 0.8})});
+  for (const double away_s : {0.1, 60.0}) {
+    TrackerRig rig;
+    rig.eye = test::look_from({-1.0, 1.2, 1.0});
+    rig.look_times(8, scene);
+    ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+    ASSERT_LT(longest_side(rig.of_class(kBoxClass)[0]->box), 0.8);
+    const ObjectId id = rig.of_class(kBoxClass)[0]->id;
+    rig.eye = test::look_from({1.0, 1.2, 1.0});
+    rig.look(scene, {}, away_s);
+    rig.look_times(8, scene);
+    ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
+    rig.eye = test::look_from({0.0, 0.3, 1.0});
+    rig.look(scene, {}, away_s);
+    rig.look_times(2 * StateConfig().merge_frames, scene);
+    ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+    EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, id);
+    EXPECT_NEAR(longest_side(rig.of_class(kBoxClass)[0]->box), 1.8, 0.1);
+    EXPECT_EQ(rig.count(EventKind::kRemoved) + rig.count(EventKind::kMoved), 0u) << rig.told();
+  }
+}
+
 // A post hides what is between them, and one visit showed the left one, another the right one.
 TEST(Found, ThingsWhoseFacesAreInOnePlaneAreNoSidesOfOneThing) {
   const Eigen::Vector3d size(0.8, 0.4, 1.3);
