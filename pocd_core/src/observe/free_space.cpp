@@ -135,6 +135,13 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
   }
 }
 
+std::optional<std::string> FreeSpace::problem() const {
+  if (left_out_ == 0) return std::nullopt;
+  return "free space has " + std::to_string(most_blocks_) +
+         " blocks, the most there may be, and no room for " + std::to_string(left_out_) +
+         " more: what arrives there is told as found";
+}
+
 void FreeSpace::forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside) {
   for (auto entry = blocks_.begin(); entry != blocks_.end();) {
     const BlockKey key = entry->first;

@@ -62,12 +62,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                owner_of_pixel);
   free_space_.update(cloud, field, config_.depth_noise, config_.map.max_depth_m,
                      config_.change.pose_tolerance_m);
-  if (free_space_.left_out() > 0) {
-    result.warnings.push_back("free space has " + std::to_string(free_space_.most_blocks()) +
-                              " blocks, the most there may be, and no room for " +
-                              std::to_string(free_space_.left_out()) +
-                              " more: what arrives there is told as found");
-  }
+  if (auto problem = free_space_.problem()) result.warnings.push_back(std::move(*problem));
 }
 
 void ObjectTracker::set_clock_back(StampNs newest_ns, StampNs now_ns) {

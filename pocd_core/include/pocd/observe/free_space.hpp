@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
+#include <string>
 #include <unordered_map>
 
 #include "pocd/map/voxel_block.hpp"
@@ -45,9 +47,10 @@ class FreeSpace {
   void forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside);
 
   std::size_t block_count() const { return blocks_.size(); }
-  std::size_t most_blocks() const { return most_blocks_; }
   /// Blocks that the last update saw empty and had no room for.
   std::size_t left_out() const { return left_out_; }
+  /// A line that says so; nothing when there are none.
+  std::optional<std::string> problem() const;
 
   /// Keys of the blocks that may have changed since the last call, for who writes them down; noted
   /// from the first call on.
