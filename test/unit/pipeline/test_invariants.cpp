@@ -258,6 +258,33 @@ TEST(Invariants, AnActIsNoLargerThanItsEvidenceInTheRoom) {
   EXPECT_GT(totals.cleared, 500);
 }
 
+// The robot passes a long thing. While it stands before one end, that end is carried off: the other
+// one, which is out of view, stands.
+TEST(Invariants, AnActIsNoLargerThanItsEvidenceOfALongThing) {
+  const PipelineConfig config = test::room_config();
+  PocdPipeline pipeline(config);
+  Witness witness;
+  Totals totals;
+  std::uint64_t count = 0;
+  const auto watch = [&](const Scene& scene, double x_m) {
+    Frame frame = test::shoot(scene, test::look_from({x_m, 0.3, 1.0}), count++);
+    test::add_noise(frame, config.depth_noise, 17);
+    expect_within_evidence(pipeline, frame, totals, &witness);
+  };
+  const Scene before = room_with({solid(kBoxClass, {0.0, 2.2}, {2.8, 0.3, 0.7})});
+  const Scene after = room_with({solid(kBoxClass, {-0.55, 2.2}, {1.7, 0.3, 0.7})});
+  constexpr int kPass = 20;  // frames from end to end
+  constexpr double kEnd_m = 0.9;
+  for (int i = 0; i <= 3 * kPass; ++i) watch(before, -kEnd_m * std::cos(M_PI * i / kPass));
+  for (int i = 0; i < 12; ++i) watch(after, kEnd_m);
+  for (int i = 0; i <= kPass; ++i) watch(after, kEnd_m * std::cos(M_PI * i / kPass));
+  EXPECT_EQ(totals.removed, 1);
+  EXPECT_EQ(totals.moved, 0);
+  EXPECT_GT(totals.cleared, 100);
+  ASSERT_EQ(pipeline.objects().size(), 1u);
+  EXPECT_NEAR(pipeline.objects()[0].box.pose.position_W.x(), -0.55, 0.1);
+}
+
 // Noise, wandering poses and holes in the depth: nothing changed, and nothing is said to have.
 TEST(Invariants, AStillSceneHasNoRemovalsAndNoMoves) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
