@@ -103,8 +103,8 @@ class Witness {
     }
   }
   /// Of the surface that was lost in this frame: what was measured within the last looks and not
-  /// seen through since; and pieces of which nothing was ever seen through. A piece's parts are no
-  /// farther apart than a thing is thick.
+  /// seen through since; and pieces of which nothing was measured once and seen through since. A
+  /// piece's parts are no farther apart than a thing is thick.
   std::pair<int, int> standing_and_untouched(const Blocks& before, const TsdfMap& map,
                                              double thick_m) const {
     const double voxel_m = map.config().voxel_size_m;
@@ -118,7 +118,8 @@ class Witness {
         const auto at = seen_.find({key, v});
         const Seen seen = at == seen_.end() ? Seen() : at->second;
         if (seen.through > 0 && seen.through >= seen.measured) {
-          gone.push_back(centre(key, v, voxel_m));
+          // Voxels at an outline were never measured all around: they tell nothing of a thing.
+          if (seen.measured > 0) gone.push_back(centre(key, v, voxel_m));
         } else {
           standing += seen.measured > 0 && frame_ - seen.measured < kLately;
           unseen.push_back(centre(key, v, voxel_m));
@@ -133,7 +134,8 @@ class Witness {
   }
 
  private:
-  static constexpr int kKnown = 8, kNearSurface = 16384, kLately = 3;
+  /// A quarter of the truncation: before a surface that stands, nothing farther is seen through.
+  static constexpr int kKnown = 8, kNearSurface = 8192, kLately = 3;
   static Eigen::Vector3d centre(const BlockKey& key, int v, double voxel_m) {
     return Eigen::Vector3d(8 * key.x + (v & 7) + 0.5, 8 * key.y + (v >> 3 & 7) + 0.5,
                            8 * key.z + (v >> 6) + 0.5) *
