@@ -91,6 +91,7 @@ std::vector<Figure> figures_of(const NodeReport& report) {
   list.count("frames processed", "frames_processed_total", work.processed);
   list.count("frames refused", "frames_refused_total", work.refused);
   list.count("frames dropped", "frames_dropped_total", frames.dropped);
+  list.count("warnings", "warnings_total", work.warnings);
   list.count("frames in queue", "queue_frames", report.queued);
   add_map_memory(list, work.memory);
   if (work.kept) add_kept(list, *work.kept);

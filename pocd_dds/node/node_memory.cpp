@@ -73,6 +73,12 @@ MemoryStatus NodeMemory::status() const { return memory_ ? memory_->status() : M
 
 void NodeMemory::count_problems(ProblemCounter& problems) {
   const MemoryStatus now = status();
+  if (now.events_lost > events_lost_counted_) {
+    problems.count("node.memory", "events_not_kept",
+                   "the log has no room for events that could not be written: the oldest are lost",
+                   now.events_lost - events_lost_counted_);
+    events_lost_counted_ = now.events_lost;
+  }
   if (now.failures <= failures_counted_) return;
   problems.count("node.memory", now.stopped ? "nothing_kept" : "not_kept", now.problem,
                  now.failures - failures_counted_);

@@ -45,6 +45,7 @@ class NodeMemory {
   std::optional<WarehouseMemory> memory_;
   bool changed_ = false, hurried_ = false;
   std::uint64_t failures_counted_ = 0;
+  std::uint64_t events_lost_counted_ = 0;
 };
 
 }  // namespace pocd::dds

@@ -4,15 +4,16 @@
 
 namespace pocd {
 
-Belief next_belief(const Belief& before, const Measurement& measurement, const StateConfig& state,
-                   const ChangeConfig& change) {
-  Belief after = bayesian_update(before, measurement, change.delta_max_m).belief;
+UpdateResult next_belief(const Belief& before, const Measurement& measurement,
+                         const StateConfig& state, const ChangeConfig& change) {
+  UpdateResult result = bayesian_update(before, measurement, change.delta_max_m);
+  Belief& after = result.belief;
   // The bound is on v alone: what is known of l goes on.
   if (after.stationarity() > state.max_stationarity && after.stationarity() > before.stationarity())
     after.alpha = before.alpha, after.beta = before.beta;
   after = clamp_counts(after, state.max_count);
   after.sigma = std::max(after.sigma, state.min_sigma_share * change.tau_m);
-  return after;
+  return result;
 }
 
 void forget_evidence(Belief& belief, const StateConfig& state) {

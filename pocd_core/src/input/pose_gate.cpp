@@ -59,10 +59,12 @@ void PoseGate::forget_oldest_but(const std::string& robot) {
     oldest = it;
     oldest_ns = heard_ns;
   }
+  forgotten_ = oldest->first;
   tracks_.erase(oldest);
 }
 
 std::optional<std::string> PoseGate::refuse(const Frame& frame) {
+  forgotten_.reset();
   const auto [it, fresh] = tracks_.try_emplace(frame.robot);
   if (tracks_.size() > kMostRobots) forget_oldest_but(frame.robot);
   Track& track = it->second;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
+#include <iterator>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -87,7 +89,7 @@ struct WarehouseMemory::Impl {
   FileHead head;
   StoredState stored;  // as it was when the folder was taken; then the pipeline's thread's
   std::int64_t run = 0;
-  std::vector<ObjectEvent> events;  // the pipeline's thread
+  std::deque<ObjectEvent> events;  // the pipeline's thread
   Clock::time_point last_step{};
   std::unique_ptr<StepWriter> writer;
 
@@ -190,7 +192,8 @@ void WarehouseMemory::Impl::gather(PocdPipeline& pipeline, const MapPublisher& p
   last_step = Clock::now();
   auto step = std::make_unique<MemoryStep>();
   gather_changes(pipeline, publisher, *step);
-  step->events = std::move(events);
+  step->events.assign(std::make_move_iterator(events.begin()),
+                      std::make_move_iterator(events.end()));
   events.clear();
   step->state.run = run;
   step->state.clean = clean;
@@ -204,6 +207,7 @@ void WarehouseMemory::Impl::gather(PocdPipeline& pipeline, const MapPublisher& p
   hand_over(std::move(step));
   const std::lock_guard<std::mutex> guard(mutex);
   status.gather_cpu_ms += cpu_ms;
+  status.events_waiting = 0;
 }
 
 WarehouseMemory::WarehouseMemory(const MemoryConfig& config, const TsdfConfig& map)
@@ -253,7 +257,13 @@ void WarehouseMemory::start(PocdPipeline& pipeline, const ClassMap& classes, con
 }
 
 void WarehouseMemory::add(const FrameResult& result) {
-  impl_->events.insert(impl_->events.end(), result.events.begin(), result.events.end());
+  Impl& m = *impl_;
+  if (result.events.empty()) return;
+  m.events.insert(m.events.end(), result.events.begin(), result.events.end());
+  const std::lock_guard<std::mutex> guard(m.mutex);
+  const std::size_t most = m.status.stopped ? 0 : kMostWaiting;
+  for (; m.events.size() > most; ++m.status.events_lost) m.events.pop_front();
+  m.status.events_waiting = m.events.size();
 }
 
 bool WarehouseMemory::due() const {

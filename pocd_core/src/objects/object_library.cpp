@@ -15,6 +15,12 @@ std::int32_t cell_of(double v) { return static_cast<std::int32_t>(std::floor(v /
 
 }  // namespace
 
+bool LibraryObject::note_seer(const std::string& robot) {
+  if (seen_by.size() >= kMostSeers) return seen_by.count(robot) > 0;
+  seen_by.insert(robot);
+  return true;
+}
+
 LibraryObject& ObjectLibrary::create(double spacing_m) {
   const ObjectId id{next_id_++};
   touch(id);
@@ -33,7 +39,7 @@ const LibraryObject* ObjectLibrary::find(ObjectId id) const {
 }
 
 void ObjectLibrary::erase(ObjectId id) {
-  touch(id);
+  touch_gone(id);
   unfile(id);
   objects_.erase(id);
 }
@@ -42,7 +48,7 @@ void ObjectLibrary::rename(ObjectId from, ObjectId to) {
   POCD_CHECK(find(to) == nullptr);
   const auto it = objects_.find(from);
   POCD_CHECK(it != objects_.end());
-  touch(from);
+  touch_gone(from);
   touch(to);
   unfile(from);
   std::unique_ptr<LibraryObject> object = std::move(it->second);
@@ -52,9 +58,18 @@ void ObjectLibrary::rename(ObjectId from, ObjectId to) {
   place(moved, moved.box);
 }
 
+void ObjectLibrary::touch_gone(ObjectId id) {
+  if (to_index(id) < untold_id_) {
+    touch(id);
+  } else {
+    touched_.erase(id);
+  }
+}
+
 std::set<ObjectId> ObjectLibrary::take_touched() {
   std::set<ObjectId> ids = std::move(touched_);
   touched_.clear();
+  untold_id_ = next_id_;
   if (!std::exchange(notes_touched_, true)) {
     for (const auto& entry : objects_) ids.insert(entry.first);
   }

@@ -15,7 +15,10 @@ int floor_div(double v, double size) { return static_cast<int>(std::floor(v / si
 
 }  // namespace
 
-FreeSpace::FreeSpace(double cell_m) : cell_m_(cell_m) { POCD_CHECK(cell_m > 0.0); }
+FreeSpace::FreeSpace(double cell_m, std::size_t most_blocks)
+    : cell_m_(cell_m), most_blocks_(most_blocks) {
+  POCD_CHECK(cell_m > 0.0);
+}
 
 FreeSpace::Place FreeSpace::place_of(const Eigen::Vector3f& point_W) const {
   const int x = floor_div(point_W.x(), cell_m_), y = floor_div(point_W.y(), cell_m_),
@@ -43,6 +46,7 @@ void FreeSpace::forget_behind(const Eigen::Vector3f& eye_W, const Eigen::Vector3
 
 void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
                        const DepthNoise& noise, double max_depth_m, double pose_tolerance_m) {
+  left_out_ = 0;
   const CameraModel& camera = cloud.camera;
   const double block_m = cell_m_ * kSide;
   const Pose T_C_W = cloud.T_W_C.inverse();
@@ -113,6 +117,10 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
           const float behind = p.z() + half_diagonal + static_cast<float>(pose_tolerance_m) +
                                3.0f * static_cast<float>(noise.sigma(p.z()));
           if (depth <= behind || field.nearest(col, row, radius_px / p.z()) <= behind) continue;
+          if (!block && blocks_.size() >= most_blocks_) {
+            ++left_out_;
+            break;
+          }
           if (!block) {
             auto& made = blocks_[{bx, by, bz}];
             made = std::make_unique<Block>();
@@ -125,6 +133,13 @@ void FreeSpace::update(const OrganizedCloud& cloud, const DepthField& field,
       }
     }
   }
+}
+
+std::optional<std::string> FreeSpace::problem() const {
+  if (left_out_ == 0) return std::nullopt;
+  return "free space has " + std::to_string(most_blocks_) +
+         " blocks, the most there may be, and no room for " + std::to_string(left_out_) +
+         " more: what arrives there is told as found";
 }
 
 void FreeSpace::forget_where(const std::function<bool(const Eigen::Vector2d&)>& inside) {

@@ -10,8 +10,8 @@ namespace {
 
 /// An object owns what an observation shows of it from this many points on.
 constexpr int kLeastShared = 5;
-/// A piece has arrived when more than this share of it lies where nothing was seen before: where a
-/// thing stood before, and near the ground, a free place is not known as one.
+/// A piece has arrived when more than this share of it lies where space was seen empty before. Not
+/// all of it: where a thing stood before, and near the ground, a free place is not known as one.
 constexpr double kArrivedShare = 0.3;
 /// Pieces of which so much of the smaller one's box lies in the other's are one.
 constexpr double kOverlapShare = 0.3;

@@ -38,7 +38,7 @@ struct ArchiveAccess {
   }
   template <class Archive>
   static void describe(Archive& a, PoseGate& gate) {
-    [[maybe_unused]] auto& [config, tracks] = gate;
+    [[maybe_unused]] auto& [config, tracks, forgotten] = gate;
     by_robot(a, tracks);
   }
   template <class Archive>
@@ -147,8 +147,10 @@ struct ArchiveAccess {
     // Looks are of one frame, and what changed is listed with each result.
     [[maybe_unused]] auto& [config, library, free_space, departures, arrivals, next_event, looks,
                             changed] = tracker;
-    [[maybe_unused]] auto& [objects, grid, filed, next_id, notes, touched, visits] = library;
-    [[maybe_unused]] auto& [cell_m, blocks, notes_changes, changed_blocks] = free_space;
+    [[maybe_unused]] auto& [objects, grid, filed, next_id, notes, untold, touched, visits] =
+        library;
+    [[maybe_unused]] auto& [cell_m, most_blocks, blocks, left_out, notes_changes, changed_blocks] =
+        free_space;
     a(next_id, next_event, departures, arrivals);
   }
   static ObjectLibrary& library(ObjectTracker& t) { return t.library_; }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "pocd/input/pose_gate.hpp"
 #include "pocd/input/stamp_order.hpp"
 
 namespace pocd {
@@ -29,6 +30,7 @@ class FrameClock {
     Heard& own = robots_[robot];
     own.stamp_ns = stamp_ns;
     own.frame = frames_;
+    if (robots_.size() > PoseGate::kMostRobots) forget_oldest();
     if (!newest_ns_ || near(stamp_ns, *newest_ns_)) {
       newest_ns_ = std::max(newest_ns_.value_or(stamp_ns), stamp_ns);
       own.off_in_a_row = 0;
@@ -55,6 +57,8 @@ class FrameClock {
   }
   /// Of the frames that were used.
   StampNs newest_ns() const { return newest_ns_.value_or(0); }
+  /// That have a voice: at most PoseGate::kMostRobots.
+  std::size_t robots() const { return robots_.size(); }
 
  private:
   friend struct ArchiveAccess;
@@ -73,6 +77,12 @@ class FrameClock {
     for (auto heard = robots_.begin(); heard != robots_.end();) {
       heard = frames_ - heard->second.frame > lately ? robots_.erase(heard) : std::next(heard);
     }
+  }
+
+  void forget_oldest() {
+    robots_.erase(std::min_element(
+        robots_.begin(), robots_.end(),
+        [](const auto& a, const auto& b) { return a.second.frame < b.second.frame; }));
   }
 
   std::optional<StampNs> newest_ns_;

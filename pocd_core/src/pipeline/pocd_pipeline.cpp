@@ -130,9 +130,17 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
     if (!result.accepted) return result;
     p.tracker.set_clock_back(newest_ns, frame.stamp_ns);
   }
-  if (const auto reason = p.pose_gate.refuse(frame)) {
+  const auto refused = p.pose_gate.refuse(frame);
+  if (const auto robot = p.pose_gate.take_forgotten()) {
+    p.grounds.forget(*robot);
+    p.masks.forget(*robot);
+    result.warnings.push_back("more than " + std::to_string(PoseGate::kMostRobots) +
+                              " names of robots: " + (robot->empty() ? "\"\"" : *robot) +
+                              ", heard of longest ago, would be a new robot");
+  }
+  if (refused) {
     result.accepted = false;
-    result.warnings.push_back(*reason + ": frame not used");
+    result.warnings.push_back(*refused + ": frame not used");
     return result;
   }
   StageClock clock(p.pool, result.timings);

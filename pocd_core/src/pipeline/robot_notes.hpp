@@ -6,22 +6,20 @@
 #include <optional>
 #include <string>
 
-#include "pocd/input/pose_gate.hpp"
+#include "pocd/common/types.hpp"
 #include "pocd/segmentation/planes.hpp"
 
 namespace pocd {
+
+// Names may be many: the pipeline forgets those that the pose gate forgets.
 
 /// The ground under each robot, or camera with a name of its own: floors of two storeys, and poses
 /// that are off by some centimetres, are another one's affair. Not thread-safe.
 class Grounds {
  public:
-  GroundModel& of(const std::string& robot) {
-    // Names may be many; the next frame that shows the floor tells it anew.
-    if (by_robot_.size() >= PoseGate::kMostRobots && by_robot_.count(robot) == 0) by_robot_.clear();
-    return by_robot_[robot];
-  }
+  GroundModel& of(const std::string& robot) { return by_robot_[robot]; }
+  void forget(const std::string& robot) { by_robot_.erase(robot); }
   void clear() { by_robot_.clear(); }
-  std::size_t size() const { return by_robot_.size(); }
 
  private:
   friend struct ArchiveAccess;
@@ -46,7 +44,6 @@ class MaskWatch {
   };
   Masks judge(const std::string& robot, StampNs stamp_ns, bool has_mask) {
     if (has_mask) {
-      if (robots_.size() >= PoseGate::kMostRobots && robots_.count(robot) == 0) robots_.clear();
       robots_[robot].missing_since_ns.reset();
       return Masks::kUsed;
     }
@@ -58,6 +55,7 @@ class MaskWatch {
     robots_.erase(found);
     return Masks::kEnd;
   }
+  void forget(const std::string& robot) { robots_.erase(robot); }
 
  private:
   friend struct ArchiveAccess;

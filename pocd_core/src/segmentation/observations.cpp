@@ -44,8 +44,8 @@ OrientedBox sample_box(const OrganizedCloud& cloud, const PlaneSegmentation& pla
   return fit_box(points, normals, 0.01);
 }
 
-/// The published rule: overlapping cuboids are one thing seen in pieces. The larger one's class
-/// wins.
+/// Boxes that overlap by a good share are one thing seen in pieces, with the larger one's class. As
+/// published, any overlap is enough: see merge_overlapping_observations().
 void merge_overlapping(const OrganizedCloud& cloud, const PlaneSegmentation& planes,
                        double min_size_m, std::vector<Cluster>& clusters, Memory& memory) {
   constexpr double kSameClass = 0.3, kOtherClass = 0.8;

@@ -17,11 +17,10 @@ Evidence apply_measurement(LibraryObject& object, double delta_m, double sigma_m
   Measurement measurement{evidence.delta_m, object.stationarity_class, sigma_m, 0.0};
   measurement.k = adaptive_k(object.belief, measurement, change.delta_max_m, state.k);
   evidence.k = measurement.k;
-  const UpdateResult update = bayesian_update(object.belief, measurement, change.delta_max_m);
+  const UpdateResult update = next_belief(object.belief, measurement, state, change);
   evidence.c1 = update.c1;
   evidence.c2 = update.c2;
-  object.belief = next_belief(object.belief, measurement, state, change);
-  evidence.after = object.belief;
+  evidence.after = object.belief = update.belief;
   return evidence;
 }
 

@@ -183,7 +183,7 @@ void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departur
   found.most_surfels = found.model.surfels().size();
   refit_box(step, found);
   found.first_seen_ns = from.first_seen_ns;
-  found.seen_by.insert(from.seen_by.begin(), from.seen_by.end());
+  for (const std::string& robot : from.seen_by) found.note_seer(robot);
   found.confirmed = true;
   found.arrival = Arrival::kArrived;
   found.moved = true;

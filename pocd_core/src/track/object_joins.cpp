@@ -1,6 +1,8 @@
 // ObjectTracker: which objects are one thing, and how they are joined.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "tracker_step.hpp"
 
@@ -64,6 +66,14 @@ bool ObjectTracker::form_corner(const LibraryObject& a, const LibraryObject& b) 
   return lie_before(of_a, of_b, before_m) && lie_before(of_b, of_a, before_m);
 }
 
+void ObjectTracker::forget_gone_companions(LibraryObject& object) {
+  for (auto at = object.companions.begin(); at != object.companions.end();) {
+    // What departed lately may be found again.
+    const bool there = std::as_const(library_).find(at->first) || departures_.has(at->first);
+    at = there ? std::next(at) : object.companions.erase(at);
+  }
+}
+
 bool ObjectTracker::connected(const LibraryObject& a, const LibraryObject& b) const {
   if (form_corner(a, b)) return false;
   const bool a_less = a.model.surfels().size() < b.model.surfels().size();
@@ -119,6 +129,8 @@ void ObjectTracker::join_objects(Step& step) {
                    step.observations.list[u.observation].instance != 0;
         }
       }
+      // Things that come and go beside one that stays would be listed without end.
+      if ((apart || one_piece) && x.companions.count(y.id) == 0) forget_gone_companions(x);
       if (apart) {
         x.companions[y.id] = LibraryObject::kToldApart;
         continue;
@@ -165,7 +177,7 @@ void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& a
   survivor.most_surfels = std::max(survivor.most_surfels, survivor.model.surfels().size());
   // Both were seen in the same looks, for the most part.
   survivor.observations = std::max(survivor.observations, absorbed.observations);
-  survivor.seen_by.insert(absorbed.seen_by.begin(), absorbed.seen_by.end());
+  for (const std::string& robot : absorbed.seen_by) survivor.note_seer(robot);
   // What arrived is no side of what stood there: all of it arrived.
   if (survivor.arrival == Arrival::kUnknown && absorbed.arrival == Arrival::kArrived)
     survivor.arrival = Arrival::kArrived;

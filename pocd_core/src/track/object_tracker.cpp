@@ -62,6 +62,7 @@ void ObjectTracker::update(const Frame& frame, const OrganizedCloud& cloud, cons
                owner_of_pixel);
   free_space_.update(cloud, field, config_.depth_noise, config_.map.max_depth_m,
                      config_.change.pose_tolerance_m);
+  if (auto problem = free_space_.problem()) result.warnings.push_back(std::move(*problem));
 }
 
 void ObjectTracker::set_clock_back(StampNs newest_ns, StampNs now_ns) {
@@ -271,7 +272,12 @@ void ObjectTracker::fuse(Step& step, LibraryObject& object,
   if (!std::exchange(moment.observed, true)) ++object.observations;
   object.last_seen_ns = step.frame.stamp_ns;
   object.last_robot = step.frame.robot;
-  if (!step.frame.robot.empty()) object.seen_by.insert(step.frame.robot);
+  if (!step.frame.robot.empty() && !object.note_seer(step.frame.robot)) {
+    step.result.warnings.push_back("object " + std::to_string(to_index(object.id)) +
+                                   " was seen by more than " +
+                                   std::to_string(LibraryObject::kMostSeers) +
+                                   " robots: " + step.frame.robot + " is not listed");
+  }
   mark_changed(object);
 }
 

@@ -105,6 +105,8 @@ class ObjectTracker {
   /// Whether each of two objects lies before the other one, as the walls of a corner do seen from
   /// within: a body has no such sides.
   bool form_corner(const LibraryObject& a, const LibraryObject& b) const;
+  /// Of those that neither are there nor departed lately.
+  void forget_gone_companions(LibraryObject& object);
   /// Whether two objects of one piece in the image are one piece of surface in the map.
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects may be sides of one body: nothing was ever seen through between them, and

@@ -22,7 +22,8 @@ TEST(NextBelief, IsTheBayesianStepWithItsBounds) {
     const double delta_m = random.uniform(-0.3, 0.3);
     const Belief plain =
         bayesian_update(before, {delta_m, s, kChange.tau_m, k}, kChange.delta_max_m).belief;
-    const Belief after = next_belief(before, {delta_m, s, kChange.tau_m, k}, kState, kChange);
+    const Belief after =
+        next_belief(before, {delta_m, s, kChange.tau_m, k}, kState, kChange).belief;
     ASSERT_LE(after.alpha + after.beta, kState.max_count * (1 + 1e-12));
     ASSERT_GE(after.sigma, kState.min_sigma_share * kChange.tau_m);
     ASSERT_NEAR(after.stationarity(), plain.stationarity(), 1e-12) << "the cap keeps E[v]";
@@ -39,14 +40,14 @@ TEST(NextBelief, TheBoundVMaxIsOnTheScoreAlone) {
   ASSERT_GT(bayesian_update(before, {0.0, 1, kChange.tau_m, 3.0}, kChange.delta_max_m)
                 .belief.stationarity(),
             state.max_stationarity);
-  const Belief after = next_belief(before, {0.0, 1, kChange.tau_m, 3.0}, state, kChange);
+  const Belief after = next_belief(before, {0.0, 1, kChange.tau_m, 3.0}, state, kChange).belief;
   EXPECT_EQ(after.alpha, before.alpha);
   EXPECT_EQ(after.beta, before.beta);
   EXPECT_LT(std::abs(after.mu), std::abs(before.mu)) << "what is known of l goes on";
   EXPECT_LT(after.sigma, before.sigma);
   // What lowers the score is applied from there all the same.
   EXPECT_LT(next_belief(before, {kChange.delta_max_m, 0, kChange.tau_m, 3.0}, state, kChange)
-                .stationarity(),
+                .belief.stationarity(),
             before.stationarity());
 }
 
@@ -64,7 +65,7 @@ TEST(NextBelief, AtVMaxTheChangeIsFollowedFromEveryBelief) {
     const double first_m = std::abs(belief.mu - moved_m);
     for (int k = 0; k < 30; ++k) {
       const Belief next =
-          next_belief(belief, {moved_m, 1, kChange.tau_m, kState.k}, state, kChange);
+          next_belief(belief, {moved_m, 1, kChange.tau_m, kState.k}, state, kChange).belief;
       at_bound += next.alpha == belief.alpha && next.beta == belief.beta;
       belief = next;
     }

@@ -162,10 +162,10 @@ TEST(TsdfMap, ListOfDirtyBlocksIsBoundedThoughNobodyTakesIt) {
 
 TEST(TsdfMap, ReadersBesideEachOtherAreAllCounted) {
   TsdfMap map(coarse_config());
-  for (int i = 0; i < 16; ++i) map.touch({i, 0, 0});
+  map.touch({0, 0, 0});  // one block: the shorter a call, the more of them meet
   const TsdfMap& read = map;
   const MapVisits before = read.visits();
-  constexpr int kThreads = 4, kReads = 20'000;
+  constexpr int kThreads = 4, kReads = 200'000;
   std::vector<std::thread> threads;
   for (int t = 0; t < kThreads; ++t) {
     threads.emplace_back([&read] {
@@ -173,7 +173,7 @@ TEST(TsdfMap, ReadersBesideEachOtherAreAllCounted) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(read.visits().blocks - before.blocks, 16u * kThreads * kReads);
+  EXPECT_EQ(read.visits().blocks - before.blocks, 1u * kThreads * kReads);
 }
 
 TEST(TsdfMap, ImpossibleSettingsAreRejected) {

@@ -122,6 +122,29 @@ TEST(ObjectLibrary, CostOfAQueryDoesNotGrowWithTheRest) {
   EXPECT_TRUE(library.near({5005, 0, 0}, 1.0).empty());
 }
 
+// Candidates come and go all day, also when nobody asks any more what has changed.
+TEST(ObjectLibrary, WhatCameAndWentSinceItWasAskedIsNotListed) {
+  ObjectLibrary library;
+  const ObjectId old = library.create(0.05).id;
+  EXPECT_EQ(library.take_touched(), std::set<ObjectId>{old});
+  ObjectId stays = ObjectId::kNone;
+  for (int i = 0; i < 10; ++i) {
+    const ObjectId id = library.create(0.05).id;
+    if (i == 5) {
+      stays = id;
+    } else {
+      library.erase(id);
+    }
+  }
+  EXPECT_EQ(library.take_touched(), std::set<ObjectId>{stays});
+  library.erase(old);
+  // Known under one name, then under another that nobody heard of.
+  const ObjectId reserved = library.reserve_id();
+  library.rename(stays, reserved);
+  library.erase(reserved);
+  EXPECT_EQ(library.take_touched(), (std::set<ObjectId>{old, stays}));
+}
+
 TEST(ObjectLibrary, RenameKeepsTheObjectAndItsPlace) {
   ObjectLibrary library;
   LibraryObject& object = library.create(0.05);

@@ -195,5 +195,35 @@ TEST_F(FreeSpaceTest, MemoryFollowsTheSpaceNotTheTime) {
   EXPECT_LT(static_cast<double>(after_once), around);
 }
 
+// A localisation that drifts away for ever.
+TEST_F(FreeSpaceTest, ItsMemoryHasAnEndWhereverPosesWander) {
+  look(room_with({}), FreeSpace::kLooks);
+  const std::size_t most = free_.block_count();
+  EXPECT_FALSE(free_.problem());
+  free_ = FreeSpace(kCell_m, most);
+  Scene room = room_with({});
+  const auto wander = [&](double x_m) {
+    for (SceneObject& thing : room.objects) thing.T_W_O.pretranslate(Eigen::Vector3d(x_m, 0, 0));
+    eye_.pretranslate(Eigen::Vector3d(x_m, 0, 0));
+  };
+  look(room, FreeSpace::kLooks);
+  EXPECT_EQ(free_.left_out(), 0u);
+  for (int i = 0; i < 5; ++i) {
+    wander(20.0);
+    look(room);
+    EXPECT_EQ(free_.block_count(), most);
+    EXPECT_GT(free_.left_out(), most / 2) << "of as much space as before, but for the grid";
+    ASSERT_TRUE(free_.problem());
+    EXPECT_NE(free_.problem()->find("no room for " + std::to_string(free_.left_out())),
+              std::string::npos)
+        << *free_.problem();
+  }
+  EXPECT_TRUE(free_.seen_empty(kPlace)) << "what was known is kept";
+  EXPECT_FALSE(free_.seen_empty(kPlace + Eigen::Vector3f(100.0f, 0.0f, 0.0f)));
+  wander(-100.0);
+  look(room);
+  EXPECT_EQ(free_.left_out(), 0u);
+}
+
 }  // namespace
 }  // namespace pocd

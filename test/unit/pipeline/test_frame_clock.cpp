@@ -126,5 +126,14 @@ TEST(FrameClock, StampsMayBeAnything) {
   EXPECT_EQ(clock.judge("b", std::numeric_limits<StampNs>::min()), Verdict::kBehind);
 }
 
+TEST(FrameClock, NamesWithoutEndHaveNoMoreVoicesThanRobotsAreKept) {
+  FrameClock clock;
+  for (int i = 0; i < 1000; ++i) clock.judge("steady", i * kSecond);
+  for (int i = 1000; i < 4000; ++i) {
+    EXPECT_EQ(clock.judge("name" + std::to_string(i), i * kSecond), Verdict::kGoesOn);
+    ASSERT_LE(clock.robots(), PoseGate::kMostRobots);
+  }
+}
+
 }  // namespace
 }  // namespace pocd

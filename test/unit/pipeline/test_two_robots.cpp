@@ -1,7 +1,8 @@
 // Several robots look at the same objects: nothing counts twice, and it is known who saw what.
 #include <gtest/gtest.h>
 
-#include "../../../pocd_core/src/pipeline/robot_notes.hpp"
+#include <map>
+
 #include "drive.hpp"
 
 namespace pocd {
@@ -156,12 +157,41 @@ TEST_F(TwoStoreys, EachRobotHasAGroundOfItsOwn) {
   EXPECT_EQ(pipeline_.objects().size(), 3u);
 }
 
-TEST(Grounds, AreBoundedThoughNamesAreMany) {
-  Grounds grounds;
-  for (std::size_t i = 0; i < PoseGate::kMostRobots + 20; ++i) {
-    grounds.of("name" + std::to_string(i));
-    ASSERT_LE(grounds.size(), PoseGate::kMostRobots);
+// A robot, or who plays one, with a new name again and again: what the pipeline keeps of each is
+// measured by what a memory would store.
+TEST(ManyNames, TheRobotHeardOfLongestAgoIsForgottenByName) {
+  PocdPipeline pipeline(test::room_config());
+  Frame frame = test::shoot(room_with({}), test::swaying_camera(0));
+  frame.camera = {32, 24, 26.0, 26.0, 15.5, 11.5};
+  frame.depth_m = frame.depth_m(cv::Rect(144, 108, 32, 24)).clone();
+  frame.labels = frame.labels(cv::Rect(144, 108, 32, 24)).clone();
+  const auto show = [&](int name) {
+    frame.robot = "name" + std::to_string(name);
+    frame.stamp_ns += 66'666'667;
+    return pipeline.process_frame(frame);
+  };
+  std::map<std::uint64_t, std::size_t> part_bytes;
+  const auto bytes = [&] {
+    std::size_t sum = 0;
+    for (const Piece& piece : pipeline.take_changed_pieces()) {
+      if (piece.kind == PieceKind::kPart) part_bytes[piece.key] = piece.bytes.size();
+    }
+    for (const auto& [part, size] : part_bytes) sum += size;
+    return sum;
+  };
+  const int most = static_cast<int>(PoseGate::kMostRobots);
+  for (int i = 0; i < most; ++i) ASSERT_TRUE(show(1000 + i).warnings.empty()) << i;
+  const std::size_t full = bytes();
+  ASSERT_TRUE(show(1000).warnings.empty()) << "it is known";
+  for (int i = 0; i < 50; ++i) {
+    const FrameResult result = show(1000 + most + i);
+    ASSERT_EQ(result.warnings.size(), 1u);
+    EXPECT_NE(result.warnings[0].find("name" + std::to_string(1001 + i) + ", heard of longest ago"),
+              std::string::npos)
+        << result.warnings[0];
   }
+  // A new robot has no speed yet, and the one that came twice has one.
+  EXPECT_LT(bytes(), full + 100);
 }
 
 }  // namespace

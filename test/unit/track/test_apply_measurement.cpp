@@ -27,8 +27,10 @@ TEST(ApplyMeasurement, EvidenceAloneGivesTheBeliefAfterIt) {
     const double delta_m = random.uniform(-1.2, 1.2) * kChange.delta_max_m * (i % 2 ? 1.0 : 0.05);
     const double sigma_m = random.uniform(0.1, 0.4);
     const Evidence e = apply_measurement(object, delta_m, sigma_m, {}, kState, kChange);
-    const Belief again = next_belief(
-        e.before, {e.delta_m, e.stationarity_class, e.measurement_sigma_m, e.k}, kState, kChange);
+    const Belief again =
+        next_belief(e.before, {e.delta_m, e.stationarity_class, e.measurement_sigma_m, e.k}, kState,
+                    kChange)
+            .belief;
     ASSERT_EQ(e.measurement_sigma_m, sigma_m);
     ASSERT_EQ(again.mu, e.after.mu);
     ASSERT_EQ(again.sigma, e.after.sigma);

@@ -8,7 +8,6 @@ namespace {
 
 using test::kBoxClass;
 using test::kCageClass;
-using test::kPersonClass;
 using test::room_with;
 using test::solid;
 using test::TrackerRig;
@@ -36,6 +35,18 @@ TEST(Looks, AThingInPiecesIsSeenOncePerFrame) {
     for (const Surfel& surfel : rig.of_class(kBoxClass)[0]->model.surfels())
       ASSERT_LE(surfel.hits, looks);
   }
+}
+
+// When it was last in its place is what tells a like thing that came before it went from it.
+TEST(Looks, AThingOfFewPointsIsFoundInItsPlaceToo) {
+  TrackerRig rig;
+  rig.look_times(12, room_with({solid(kBoxClass, {0.0, 1.6}, {0.14, 0.14, 0.16})}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  const LibraryObject& small = *rig.of_class(kBoxClass)[0];
+  ASSERT_TRUE(small.confirmed) << rig.told();
+  ASSERT_LT(small.model.surfels().size(), 30u);
+  EXPECT_GT(small.in_place_ns, small.first_seen_ns);
+  EXPECT_EQ(small.in_place_ns, small.last_seen_ns);
 }
 
 // At the edge of view a post of a shelf is seen once or twice on each visit.
@@ -144,100 +155,6 @@ TEST_F(Corner, TheNearWallOfAContainerThatIsGoneDoesNotStand) {
   rig_.look_times(14, room_with({}));
   EXPECT_EQ(rig_.count(EventKind::kRemoved), 1u) << rig_.told();
   EXPECT_EQ(rig_.of_class(kBoxClass).size(), 0u) << rig_.told();
-}
-
-// A screen hides the right half of a bench. Its end is seen first, from the right.
-TEST(Found, WhatGrewOntoAKnownThingIsASideOfIt) {
-  const SceneObject bench = solid(kBoxClass, {0.0, 2.4}, {1.8, 0.3, 1.3});
-  const SceneObject screen = solid(kCageClass, {0.4, 1.6}, {0.9, 0.1, 1.6});
-  PipelineConfig config = test::room_config();
-  config.state.merge_frames = 1000;  // it is not joined for being one piece for long
-  TrackerRig rig(config);
-  rig.look_times(10, room_with({bench, screen}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  const ObjectId known = rig.of_class(kBoxClass)[0]->id;
-  rig.eye = test::look_from({1.5, 1.2, 1.0});
-  rig.look(room_with({bench}), {}, 60.0);
-  rig.look_times(8, room_with({bench}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
-  // Then the middle, from above to below.
-  rig.eye = test::look_from({0.5, 0.6, 1.0});
-  rig.look(room_with({bench, solid(kCageClass, {0.4, 1.6}, {0.9, 0.1, 0.7})}));
-  rig.look_times(3, room_with({bench}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
-}
-
-// A post hides what is between them, and one visit showed the left one, another the right one.
-TEST(Found, ThingsWhoseFacesAreInOnePlaneAreNoSidesOfOneThing) {
-  const Eigen::Vector3d size(0.8, 0.4, 1.3);
-  const auto screen = [](double x, double width) {
-    return solid(kCageClass, {x, 1.6}, {width, 0.1, 1.6});
-  };
-  const SceneObject left = solid(kBoxClass, {-0.5, 2.3}, size);
-  const SceneObject right = solid(kBoxClass, {0.5, 2.3}, size);
-  TrackerRig rig;
-  const auto visit = [&](const SceneObject& before, int looks) {
-    const Scene scene = room_with({left, right, before});
-    rig.look(scene, {}, 60.0);
-    rig.look_times(looks, scene);
-  };
-  visit(screen(0.42, 1.0), 10);
-  visit(screen(-0.42, 1.0), 10);
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
-  // On each visit it is asked once which of the known things are one.
-  visit(screen(0.0, 0.24), 3);
-  EXPECT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
-}
-
-// Of what left, a screen hid nearly the half: what came is larger than what was known.
-TEST(Found, AThingOfWhichOnlyAPartWasKnownMovesAsAWhole) {
-  const Eigen::Vector3d size(0.9, 0.3, 0.7);
-  const SceneObject screen = solid(kCageClass, {-0.12, 1.6}, {0.33, 0.1, 1.6});
-  TrackerRig rig;
-  rig.look_times(10, room_with({solid(kBoxClass, {-0.5, 2.3}, size), screen}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  const LibraryObject& known = *rig.of_class(kBoxClass)[0];
-  ASSERT_LT(longest_side(known.box), 0.65);
-  const ObjectId id = known.id;
-  const Scene after = room_with({solid(kBoxClass, {0.6, 2.3}, size), screen});
-  rig.look(after, {}, 60.0);
-  rig.look_times(40, after);
-  EXPECT_EQ(rig.count(EventKind::kMoved), 1u) << rig.told();
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, id);
-}
-
-// A pole before it shows it in two pieces. Of the place of one of them, most was hidden before.
-TEST(Found, WhatIsJoinedWithAPartThatArrivedHasArrived) {
-  const SceneObject pole = solid(kPersonClass, {0.25, 1.6}, {0.19, 0.05, 1.6});
-  const SceneObject box = solid(kBoxClass, {0.325, 2.25}, {0.65, 0.3, 0.8});
-  TrackerRig rig;
-  rig.look_times(20, room_with({solid(kPersonClass, {0.04, 1.6}, {0.09, 0.05, 1.6}), pole}));
-  rig.look(room_with({box, pole}), {}, 60.0);
-  rig.look_times(10, room_with({box, pole}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
-  EXPECT_EQ(rig.of_class(kBoxClass)[0]->arrival, Arrival::kUnknown);
-  EXPECT_EQ(rig.of_class(kBoxClass)[1]->arrival, Arrival::kArrived);
-  rig.look_times(20, room_with({box}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  EXPECT_EQ(rig.of_class(kBoxClass)[0]->arrival, Arrival::kArrived);
-}
-
-// Of four times its length, behind what hid the place: nobody saw that it was empty before.
-TEST(Found, AThingThatMovedFarToAHiddenPlaceHasMoved) {
-  const Eigen::Vector3d size(0.3, 0.3, 0.5);
-  const SceneObject screen = solid(kCageClass, {0.6, 1.8}, {0.6, 0.05, 1.4});
-  TrackerRig rig;
-  rig.look_times(10, room_with({solid(kBoxClass, {-0.6, 2.2}, size), screen}));
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  const ObjectId known = rig.of_class(kBoxClass)[0]->id;
-  const Scene after = room_with({solid(kBoxClass, {0.6, 2.2}, size)});
-  rig.look(after, {}, 60.0);
-  rig.look_times(40, after);
-  EXPECT_EQ(rig.count(EventKind::kMoved), 1u) << rig.told();
-  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
-  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
 }
 
 /// A box that is there, and two doubtful frames at the end of a visit.

@@ -30,6 +30,7 @@ class TrackerRig {
     now_s_ += after_s;
     Frame frame = shoot(scene, eye, count_++);
     frame.stamp_ns = static_cast<StampNs>(now_s_ * 1e9);
+    frame.robot = robot;
     add_noise(frame, config_.depth_noise, 3);
     if (holes) holes(frame);
     Segmented s = segment(frame, config_, ground_);
@@ -82,6 +83,7 @@ class TrackerRig {
 
   static constexpr double kPeriod_s = 1.0 / 15.0;
   Pose eye = look_from({0.0, 0.0, 1.0});
+  std::string robot;                  ///< whose frames they are
   std::function<void(Frame&)> holes;  ///< damages each frame's depth
   std::vector<ObjectEvent> events;
 

@@ -16,9 +16,9 @@ struct ChangeConfig {
     visit("delta_max_m", delta_max_m, Range{0.01, 100.0},
           "Largest change, and the pseudo-change of an object that is not there any more, "
           "Delta_max [m].");
-    visit(
-        "tau_m", tau_m, Range{0.001, 10.0},
-        "Standard deviation of a measured change; changes up to half of it verify an object [m].");
+    visit("tau_m", tau_m, Range{0.001, 10.0},
+          "Standard deviation of a measured change. A thing found again has moved from half of it "
+          "on, and a box that has changed by more is reported [m].");
     visit(
         "depth_noise_factor", depth_noise_factor, Range{0.0, 100.0},
         "Adds so many times the depth noise at the object's distance to that deviation, as a root "

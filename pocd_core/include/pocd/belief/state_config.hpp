@@ -30,7 +30,7 @@ struct StateConfig {
     visit("initial_count", initial_count, Range{0.1, 1000.0}, "alpha + beta of a new object.");
     visit("initial_sigma_m", initial_sigma_m, Range{0.001, 100.0}, "sigma of a new object [m].");
     visit("max_stationarity", max_stationarity, Range{0.5, 1.0},
-          "An update that would raise E[v] above this is not applied, v_max.");
+          "An update that would raise E[v] above this leaves it as it is, v_max.");
     visit("max_count", max_count, Range{1.0, 1e6},
           "Cap of alpha + beta: how much past evidence an object can hold against new evidence.");
     visit(
@@ -59,16 +59,20 @@ struct StateConfig {
     visit(
         "visit_gap_s", visit_gap_s, Range{0.0, 1e6},
         "When nobody was near an object for this time, the next look is a new visit: what was seen "
-        "of the space between it and its neighbours is complete, and its sides are joined [s].");
+        "of the space between it and its neighbours is complete, its sides are joined, and looks "
+        "in a row end [s].");
     visit(
         "moment_s", moment_s, Range{0.0, 10.0},
         "Looks of several robots at one object within this time are one measurement: the one that "
-        "saw most of the object counts [s].");
+        "saw most of the object counts. Looks in a row that find it gone or displaced must last "
+        "for longer [s].");
     visit("relocation_window_s", relocation_window_s, Range{0.0, 1e6},
-          "A removed object and a new one of like class and size within this time are one MOVED "
-          "[s].");
+          "A removed object and a new one of its class are one MOVED within this time, when their "
+          "surfaces align [s].");
     visit("relocation_reach_m", relocation_reach_m, Range{0.0, 1e6},
-          "A new object that is seen only in part is the removed one within this distance [m].");
+          "Longest way on which what departed is found again as MOVED; what went farther is "
+          "REMOVED and "
+          "ADDED [m].");
   }
 };
 

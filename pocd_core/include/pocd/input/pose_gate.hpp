@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "pocd/common/describe.hpp"
 #include "pocd/input/frame.hpp"
@@ -46,6 +47,8 @@ class PoseGate {
 
   static constexpr std::size_t kMostRobots = 1000;
   std::size_t robots() const { return tracks_.size(); }
+  /// The robot that the last call of refuse() forgot, if any; asked once.
+  std::optional<std::string> take_forgotten() { return std::exchange(forgotten_, std::nullopt); }
 
  private:
   friend struct ArchiveAccess;
@@ -69,6 +72,7 @@ class PoseGate {
 
   PoseGateConfig config_;
   std::map<std::string, Track> tracks_;
+  std::optional<std::string> forgotten_;
 };
 
 }  // namespace pocd

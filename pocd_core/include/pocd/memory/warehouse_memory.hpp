@@ -27,6 +27,8 @@ struct MemoryStatus {
   std::uint64_t failures = 0;        ///< times that a step could not be written
   std::string problem;               ///< why the last one could not; empty: it was written
   bool stopped = false;              ///< nothing is written any more
+  std::size_t events_waiting = 0;    ///< for the next step
+  std::uint64_t events_lost = 0;     ///< too many waited, or nothing is written any more
   StampNs stored_stamp_ns = 0;       ///< everything up to this frame is on disk
   std::uint64_t stored_version = 0;  ///< of the published map
   std::uint64_t stored_event = 0;    ///< the last one in the log
@@ -44,6 +46,9 @@ struct MemoryStatus {
 /// since the last step, and that one.
 class WarehouseMemory {
  public:
+  /// So many events wait for a disk that takes nothing; after that the oldest are lost.
+  static constexpr std::size_t kMostWaiting = 50'000;
+
   /// Takes the folder, made when it is missing. Throws InputError when it is in use or cannot be
   /// written, when the file is damaged or of another version, or when its map is of another kind
   /// than `map`.

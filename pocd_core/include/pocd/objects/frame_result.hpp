@@ -27,7 +27,7 @@ struct ObjectSnapshot {
   StampNs last_seen_ns = 0;
   std::uint32_t observations = 0;
   std::string last_robot;            ///< namespace of the robot that saw it last
-  std::vector<std::string> seen_by;  ///< all robots that have seen it, by name
+  std::vector<std::string> seen_by;  ///< the robots that have seen it, 100 at most, by name
   /// Seen since the program started: false for what is known from a memory only. Set by publishers.
   bool seen_in_run = true;
   bool forgotten = false;  ///< by an operator's word: nobody has seen it go. Set by publishers.

@@ -31,6 +31,11 @@ struct Moment {
 struct LibraryObject {
   LibraryObject(ObjectId object_id, double spacing_m) : id(object_id), model(spacing_m) {}
 
+  /// Names may be new with each run of a robot, and every state of the object carries them all.
+  static constexpr std::size_t kMostSeers = 100;
+  /// False when there is no room for the name.
+  bool note_seer(const std::string& robot);
+
   // The thing.
   ObjectId id;
   ClassId class_id = 0;
@@ -50,7 +55,7 @@ struct LibraryObject {
   StampNs placed_ns = 0;    ///< since when it is known where it is: first seen, or moved, then
   StampNs in_place_ns = 0;  ///< the last look that found it in its place
   std::string last_robot;
-  std::set<std::string> seen_by;   ///< robots that have observed it
+  std::set<std::string> seen_by;   ///< robots that have observed it, kMostSeers of them at most
   Moment moment;                   ///< the last one
   std::uint32_t observations = 0;  ///< of a candidate without a class: on this visit
 
@@ -97,7 +102,8 @@ class ObjectLibrary {
   std::vector<ObjectId> near(const Eigen::Vector3d& center_W, double radius_m) const;
 
   /// Ids of objects that may have changed, come or gone since the last call: all that were handed
-  /// out for change. For who writes them down; noted from the first call on.
+  /// out for change. For who writes them down; noted from the first call on. Those that came and
+  /// went since are left out: candidates would be listed without end when nobody asks any more.
   std::set<ObjectId> take_touched();
   /// All of them have been changed, through all().
   void touch_all() {
@@ -118,6 +124,8 @@ class ObjectLibrary {
   void touch(ObjectId id) {
     if (notes_touched_) touched_.insert(id);
   }
+  /// Of an object that has gone.
+  void touch_gone(ObjectId id);
   using Cell = std::uint64_t;
   static Cell cell_at(std::int32_t x, std::int32_t y);
   static std::vector<Cell> cells_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
@@ -128,6 +136,7 @@ class ObjectLibrary {
   std::unordered_map<std::uint32_t, std::vector<Cell>> filed_;
   std::uint32_t next_id_ = 1;
   bool notes_touched_ = false;
+  std::uint32_t untold_id_ = 1;  ///< no id from here on was there at the last take_touched()
   std::set<ObjectId> touched_;
   mutable std::uint64_t visits_ = 0;
 };

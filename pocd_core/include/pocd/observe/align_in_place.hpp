@@ -1,4 +1,4 @@
-// Step 4 of the method: which observation is which object.
+// How an object that is found beside its place has moved, by alignment.
 #pragma once
 
 #include <optional>

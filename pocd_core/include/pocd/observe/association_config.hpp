@@ -15,12 +15,13 @@ struct AssociationConfig {
 
   template <class Visitor>
   void describe(Visitor& visit) {
+    visit("max_distance_m", max_distance_m, Range{0.01, 100.0},
+          "Longest motion by which a thing is found beside its place; what stands farther off is "
+          "another thing until its old place is seen empty, theta_dist [m].");
     visit(
-        "max_distance_m", max_distance_m, Range{0.01, 100.0},
-        "Objects and observations whose boxes' centres are farther apart are no pair, unless their "
-        "boxes overlap, theta_dist [m].");
-    visit("max_dissimilarity", max_dissimilarity, Range{0.0, 1.0},
-          "Largest share of outliers after ICP, theta_sim.");
+        "max_dissimilarity", max_dissimilarity, Range{0.0, 1.0},
+        "Largest share of outliers with which the method tracked_objects of pocd_evaluate takes a "
+        "thing to be where it was, theta_sim. The pipeline does not use it.");
     visit(
         "min_visible_share", min_visible_share, Range{0.0, 1.0},
         "Share of an object's points that a frame must measure at another place for the object to "
@@ -28,7 +29,8 @@ struct AssociationConfig {
     visit("icp_points", icp_points, Range{20, 100000}, "Points of an observation used by ICP.");
     visit("icp_iterations", icp_iterations, Range{1, 200}, "Iterations of ICP.");
     visit("icp_max_distance_m", icp_max_distance_m, Range{0.001, 10.0},
-          "Pairs of points farther apart are not used by ICP [m].");
+          "Pairs of points farther apart are not used by ICP; what stands farther before a thing "
+          "has not taken its place [m].");
   }
 };
 

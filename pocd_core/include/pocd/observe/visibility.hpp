@@ -60,17 +60,13 @@ struct Sighting {
 
   int visible() const { return hit + seen_through; }
   double visible_share() const { return total > 0 ? static_cast<double>(visible()) / total : 0.0; }
-  /// Share in the frustum and facing the camera, whatever stands before it.
-  double in_view_share() const {
-    return total > 0 ? static_cast<double>(visible() + occluded + unknown) / total : 0.0;
-  }
   double seen_through_share() const {
     return visible() > 0 ? static_cast<double>(seen_through) / visible() : 0.0;
   }
 };
 
 /// Projects the model into the frame. Surfels facing away are out of view. Margin: config.margin_m
-/// or three sigma of the depth noise, whichever is larger.
+/// or three sigma of the depth noise and the pose tolerance, whichever is larger.
 void sight_object(const std::vector<Surfel>& surfels, int min_hits, const OrganizedCloud& cloud,
                   const DepthField& field, const Observations& observations,
                   const SightConfig& config, const DepthNoise& noise, Sighting& out);
