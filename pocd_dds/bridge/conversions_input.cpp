@@ -35,6 +35,7 @@ Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info) {
   fields.width = info.width();
   fields.height = info.height();
   fields.k = info.k();
+  fields.p = info.p();
   fields.binning_x = info.binning_x();
   fields.binning_y = info.binning_y();
   fields.roi_x = info.roi().x_offset();

@@ -127,21 +127,25 @@ std::optional<cv::Mat> RobotStreams::converted(Stream stream, const ImageView& i
     return std::nullopt;
   }
   const LabelImage& mask = *labels.value;
+  const auto share = [&](std::uint64_t pixels) {
+    return "; " + percent(pixels, mask.labels.total()) + " of the pixels";
+  };
   if (mask.unknown_pixels > 0) {
-    context_.problems.count(
-        on,
-        {InputReason::kUnknownColour, "a colour of no class became class 0: " +
-                                          percent(mask.unknown_pixels, mask.labels.total()) +
-                                          " of the pixels"},
-        mask.unknown_pixels);
+    std::string colours;
+    for (const std::string& rgb : mask.unknown) colours += (colours.empty() ? "" : "; ") + rgb;
+    const char* none = context_.labels.has_colours() ? "" : " (no class has an rgb)";
+    context_.problems.count(on,
+                            {InputReason::kUnknownColour,
+                             "colours r,g,b of no class of classes.list" + std::string(none) +
+                                 " became class 0: " + colours + share(mask.unknown_pixels)},
+                            mask.unknown_pixels);
   }
   if (mask.unlisted_pixels > 0) {
     std::string ids;
-    for (const int id : mask.unlisted) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
-    context_.problems.count(
-        on, {InputReason::kUnlistedClass,
-             "ids that are no class of classes.list and so background: " + ids + "; " +
-                 percent(mask.unlisted_pixels, mask.labels.total()) + " of the pixels"});
+    for (const auto id : mask.unlisted) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    context_.problems.count(on, {InputReason::kUnlistedClass,
+                                 "ids that are no class of classes.list and so background: " + ids +
+                                     share(mask.unlisted_pixels)});
   }
   return mask.labels;
 }
@@ -266,11 +270,12 @@ void RobotStreams::look_for_depth(const Frame& frame) {
   if (depths.size() >= enough) {
     const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
     std::nth_element(depths.begin(), middle, depths.end());
-    char text[160];
+    char text[260];
     std::snprintf(
         text, sizeof text,
-        "the median depth is %.4g m, none is from %.2g to %.4g m: is the unit another one "
-        "(node.depth_scale, now %g)?",
+        "the median depth is %.4g m, none is from %.2g to %.4g m (map.max_depth_m): is the unit "
+        "another one (--set node.depth_scale=0.1 for tenths of a millimetre, 0.001 for float "
+        "millimetres; now %g)?",
         static_cast<double>(*middle), static_cast<double>(kNearest_m), context_.max_depth_m,
         robot_.depth_scale);
     what = text;

@@ -39,6 +39,7 @@ class RobotStreams {
   RobotStreams& operator=(const RobotStreams&) = delete;
 
   const std::string& name() const { return robot_.name; }
+  const RobotConfig& config() const { return robot_; }
   /// Its topics on the bus.
   std::string topic(InputStream stream) const { return topic_of(context_.input, robot_, stream); }
   std::string topic(Stream stream) const;
