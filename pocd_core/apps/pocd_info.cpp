@@ -81,7 +81,8 @@ bool suggest(const std::vector<std::filesystem::path>& inputs) {
   std::vector<pocd::TopicInfo> topics;
   for (const auto& input : inputs) {
     for (const auto& file : recording_files(input)) {
-      for (const RecordedChannel& channel : open_recording(file)->channels()) {
+      const auto reader = open_recording(file);
+      for (const RecordedChannel& channel : reader->channels()) {
         if (channel.messages == 0) continue;
         topics.push_back({pocd::bus_name(channel.topic), pocd::ros_type_name(channel.type)});
       }

@@ -112,6 +112,12 @@ std::string pattern_for(const std::string& topic, const std::string& robot) {
 
 bool has_place_for_robot(const std::string& pattern) { return has(pattern, "{robot}"); }
 
+/// As it is pasted: text that begins with a brace would be a group of keys in YAML.
+std::string set_option(const std::string& key, const std::string& pattern) {
+  const std::string quote = pattern[0] == '{' ? "\"" : "";
+  return " --set 'node.topics." + key + "=" + quote + pattern + quote + "'";
+}
+
 /// Key in node.topics and pattern, of what was found for a robot.
 using Patterns = std::vector<std::pair<std::string, std::string>>;
 Patterns patterns_of(const RobotConfig& robot, const std::string& name) {
@@ -156,7 +162,7 @@ std::string options_for(const std::vector<RobotConfig>& robots) {
   bool shared = false;
   for (const auto& [key, pattern] : patterns) {
     shared = shared || !has_place_for_robot(pattern);
-    sets += " --set 'node.topics." + key + "=" + pattern + "'";
+    sets += set_option(key, pattern);
   }
   // A robot is found by its name in the topics; where that is not in all of them, it is named.
   for (const std::string& name : names) whom += shared ? " --robot " + name : "";
@@ -278,11 +284,12 @@ std::string suggestion_text(const std::vector<TopicInfo>& topics) {
   const std::string text = "image topics are: " + listed(images);
   const std::vector<RobotConfig> robots = suggest_robots(topics);
   if (robots.empty()) return text;
-  const std::string options = options_for(robots);
-  return text + (options.empty()
-                     ? "; a configuration for them is printed by pocd_info --suggest FILE, or on "
-                       "the bus by pocd_doctor --suggest"
-                     : "; try " + options);
+  if (const std::string options = options_for(robots); !options.empty()) {
+    return text + "; try " + options;
+  }
+  return text + "; for the first try " + options_for({robots[0]}) +
+         "; a configuration for all is printed by pocd_info --suggest FILE, and on the bus by "
+         "pocd_doctor --suggest";
 }
 
 std::string instead_of(InputStream stream, const RobotConfig& robot, const InputConfig& input,
@@ -323,7 +330,7 @@ std::string instead_of(InputStream stream, const RobotConfig& robot, const Input
     if (!named && options.empty() && !has_place_for_robot(pattern)) {
       options += " --robot " + robot.name;
     }
-    options += " --set 'node.topics." + key + "=" + pattern + "'";
+    options += set_option(key, pattern);
   }
   return "there is " + listed(names) + (options.empty() ? "" : "; try" + options);
 }

@@ -183,6 +183,8 @@ TEST(SuggestInput, TheOptionsAreForAllStreamsAndRobots) {
             "--set 'node.topics.camera_info=rt/depth/camera_info' "
             "--set 'node.topics.segmentation=rt/segmentation' "
             "--set 'node.topics.odometry=rt/odom'");
+  // YAML would take text that begins with a brace for a group of keys.
+  EXPECT_EQ(options_in({{"a/depth", kImage}}), "--set 'node.topics.depth=\"{robot}/depth\"'");
   // Robots whose names have no pattern in common.
   EXPECT_NE(options_in(both(robot_at("rt/r1"), {{"rt/cam/depth", kImage}, {"rt/cam/i", kInfo}}))
                 .find("pocd_info --suggest FILE"),
