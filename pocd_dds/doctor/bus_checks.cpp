@@ -138,6 +138,9 @@ std::string advice_for(const std::string& reason) {
   }
   if (is(InputReason::kUnlistedClass)) return "complete classes.list, or correct the network's ids";
   if (is(InputReason::kNoUsableDepth)) return "see node.depth_scale and map.max_depth_m";
+  if (is(InputReason::kOtherFrame)) {
+    return "register it to depth, or send it with the frame of the depth images";
+  }
   if (is(InputReason::kNoPose)) return "one clock for camera and poses; poses as often as images";
   if (is(InputReason::kNoTransform)) {
     return "send the transform, on tf or latched on tf_static, or give the robot a mount";

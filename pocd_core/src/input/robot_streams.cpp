@@ -142,10 +142,15 @@ std::optional<cv::Mat> RobotStreams::converted(Stream stream, const ImageView& i
   }
   if (mask.unlisted_pixels > 0) {
     std::string ids;
-    for (const auto id : mask.unlisted) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    bool large = false;
+    for (const auto id : mask.unlisted) {
+      ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+      large = large || id > 255;
+    }
+    const char* instances = large ? " (of panoptic masks, see classes.label_divisor)" : "";
     context_.problems.count(on, {InputReason::kUnlistedClass,
                                  "ids that are no class of classes.list and so background: " + ids +
-                                     share(mask.unlisted_pixels)});
+                                     share(mask.unlisted_pixels) + instances});
   }
   return mask.labels;
 }
@@ -156,9 +161,23 @@ bool RobotStreams::add_image(Stream stream, StampNs stamp_ns, const std::string&
   std::optional<cv::Mat> pixels = converted(stream, image);
   if (!pixels) return false;
   if (stream == Stream::kDepth && !accept_camera_frame(frame_name(frame))) return false;
+  if (stream == Stream::kDepth) {
+    depth_frame_ = frame_name(frame);
+  } else {
+    compare_frame(stream, frame_name(frame));
+  }
   const auto problem = synchronizer_.add_image(stream, stamp_ns, std::move(*pixels));
   if (problem) context_.problems.count(topic(stream), *problem);
   return !stamp_refused(problem);
+}
+
+/// Masks and colour are of the pixels of the depth image; those of another camera are not.
+void RobotStreams::compare_frame(Stream stream, const std::string& frame) {
+  if (frame.empty() || depth_frame_.empty() || frame == depth_frame_) return;
+  context_.problems.count(topic(stream),
+                          {InputReason::kOtherFrame,
+                           "header.frame_id is \"" + frame + "\", that of the depth images \"" +
+                               depth_frame_ + "\": used as it is, but is it registered to depth?"});
 }
 
 bool RobotStreams::accept_camera_frame(const std::string& frame) {
@@ -307,6 +326,7 @@ std::vector<std::string> RobotStreams::restart() {
   own_transforms_.forget_moving();
   if (robot_.camera_frame.empty()) camera_frame_.clear();
   camera_.reset();
+  depth_frame_.clear();
   due_ns_.reset();
   depth_seen_ = false;
   frames_without_depth_ = 0;

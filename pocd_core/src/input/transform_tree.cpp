@@ -1,6 +1,7 @@
 #include "pocd/input/transform_tree.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <set>
@@ -19,6 +20,32 @@ std::string clocks_text(const TransformLookup& failure, StampNs stamp_ns) {
   constexpr StampNs kNoDelay = 60'000'000'000;
   if (stamp_ns == 0 && failure.off_ns > kNoDelay) return ": does the camera set no stamps?";
   return failure.off_ns > kNoDelay ? ": camera and poses have different clocks" : "";
+}
+
+/// Seconds to write into an option: not less than this, to a tenth.
+std::string tenths_above(StampNs ns) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1f", std::ceil(static_cast<double>(ns) * 1e-8) * 0.1);
+  return text;
+}
+
+/// Poses that come seldom, or late, can be held; what is sent once is static.
+std::string held_text(const TransformLookup& failure, const PoseBuffer* poses) {
+  if (poses != nullptr && poses->size() == 1) {
+    return "; it came once: a transform that does not change belongs on tf_static";
+  }
+  constexpr StampNs kLongestHeld = 1'000'000'000;  // of node.extrapolation_s
+  if (failure.off_ns > kLongestHeld) return "";
+  return "; --set node.extrapolation_s=" + tenths_above(failure.off_ns) + " holds that pose";
+}
+
+InputProblem gap_problem(const TransformLookup& failure, const std::pair<StampNs, StampNs>& around,
+                         StampNs stamp_ns) {
+  return {InputReason::kNoPose,
+          failure.edge + ": no pose is between " + seconds_text(around.first) + " and " +
+              seconds_text(around.second) + ", the image is of " + seconds_text(stamp_ns) +
+              " (--set node.max_pose_gap_s=" + tenths_above(around.second - around.first) +
+              " interpolates over so long)"};
 }
 
 InputProblem parent_changed(const std::string& child, const std::string& old_parent,
@@ -193,7 +220,8 @@ InputProblem TransformTree::explain(const std::string& target, const std::string
           InputReason::kNoPose,
           failure.edge + ": newest pose is of " +
               (failed == nullptr ? std::string("?") : seconds_text(failed->buffer.newest_ns())) +
-              ", the image of " + seconds_text(stamp_ns) + clocks_text(failure, stamp_ns)};
+              ", the image of " + seconds_text(stamp_ns) + clocks_text(failure, stamp_ns) +
+              held_text(failure, failed == nullptr ? nullptr : &failed->buffer)};
     case PoseLookup::kTooOld:
       return {
           InputReason::kNoPose,
@@ -201,6 +229,8 @@ InputProblem TransformTree::explain(const std::string& target, const std::string
               (failed == nullptr ? std::string("?") : seconds_text(failed->buffer.oldest_ns())) +
               ", the image of " + seconds_text(stamp_ns) + clocks_text(failure, stamp_ns)};
     case PoseLookup::kGap:
+      if (failed != nullptr) return gap_problem(failure, failed->buffer.around(stamp_ns), stamp_ns);
+      break;
     case PoseLookup::kFound:
       break;
   }

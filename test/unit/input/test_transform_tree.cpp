@@ -67,9 +67,17 @@ TEST(TransformTree, FailuresNameTheFrames) {
             "(camera <- base <- odom); is it the frame of the map? (--set node.map_frame=odom)");
   EXPECT_EQ(said(1'500'000'000).reason, InputReason::kNoPose);
   EXPECT_EQ(said(1'500'000'000).detail,
-            "odom -> base: newest pose is of 1.000 s, the image of 1.500 s");
+            "odom -> base: newest pose is of 1.000 s, the image of 1.500 s; it came once: a "
+            "transform that does not change belongs on tf_static");
   EXPECT_EQ(said(900'000'000).detail,
             "odom -> base: oldest pose is of 1.000 s, the image of 0.900 s");
+  tree.add("odom", "base", 2'000'000'000, {});
+  EXPECT_EQ(said(1'500'000'000).detail,
+            "odom -> base: no pose is between 1.000 s and 2.000 s, the image is of 1.500 s "
+            "(--set node.max_pose_gap_s=1.0 interpolates over so long)");
+  EXPECT_EQ(said(2'450'000'000).detail,
+            "odom -> base: newest pose is of 2.000 s, the image of 2.450 s; "
+            "--set node.extrapolation_s=0.5 holds that pose");
   tree.set_static("camera", "odom", {});
   EXPECT_EQ(said(1'000'000'000).reason, InputReason::kTransformLoop);
   EXPECT_EQ(said(1'000'000'000)
