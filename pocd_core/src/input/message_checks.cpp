@@ -27,11 +27,12 @@ struct Intrinsics {
   double fx, fy, cx, cy;
 };
 Intrinsics intrinsics_of(const CameraInfoFields& info) {
-  const std::array<double, 12>& p = info.p;
-  const bool usable = p[0] > 0.0 && p[5] > 0.0 && std::isfinite(p[0]) && std::isfinite(p[5]) &&
-                      std::isfinite(p[2]) && std::isfinite(p[6]);
-  if (usable) return {p[0], p[5], p[2], p[6]};
-  return {info.k[0], info.k[4], info.k[2], info.k[5]};
+  const Intrinsics lens{info.k[0], info.k[4], info.k[2], info.k[5]};
+  const Intrinsics rectified{info.p[0], info.p[5], info.p[2], info.p[6]};
+  const auto usable = [](const Intrinsics& i) {
+    return i.fx > 0.0 && i.fy > 0.0 && std::isfinite(i.fx + i.fy + i.cx + i.cy);
+  };
+  return usable(rectified) && (info.distorted || !usable(lens)) ? rectified : lens;
 }
 
 }  // namespace

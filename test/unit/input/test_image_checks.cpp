@@ -284,20 +284,25 @@ TEST(CameraModelOf, RegionAndBinningAreThoseOfImageGeometry) {
 }
 
 // As image_geometry: of a rectified image P says what it is projected by.
-TEST(CameraModelOf, ProjectionGoesBeforeTheLens) {
+TEST(CameraModelOf, OfALensThatDistortsTheProjectionCounts) {
   CameraInfoFields info;
   info.width = 640;
   info.height = 480;
   info.k = {500, 0, 320, 0, 510, 240, 0, 0, 1};
   info.p = {400, 0, 310, 0, 0, 410, 230, 0, 0, 0, 1, 0};
-  EXPECT_EQ(*camera_model(info).value, (CameraModel{640, 480, 400, 410, 310, 230}));
-  info.k = {};
-  EXPECT_EQ(*camera_model(info).value, (CameraModel{640, 480, 400, 410, 310, 230}));
+  const CameraModel lens{640, 480, 500, 510, 320, 240}, rectified{640, 480, 400, 410, 310, 230};
+  EXPECT_EQ(*camera_model(info).value, lens) << "nothing was rectified";
+  info.distorted = true;
+  EXPECT_EQ(*camera_model(info).value, rectified);
   info.p[0] = std::nan("");
+  EXPECT_EQ(*camera_model(info).value, lens);
+  info.p[0] = 400;
+  info.distorted = false;
+  info.k = {};
+  EXPECT_EQ(*camera_model(info).value, rectified);
+  info.p = {};
   ASSERT_TRUE(camera_model(info).problem);
   EXPECT_EQ(camera_model(info).problem->reason, InputReason::kZeroFocalLength);
-  info.k = {500, 0, 320, 0, 510, 240, 0, 0, 1};
-  EXPECT_EQ(*camera_model(info).value, (CameraModel{640, 480, 500, 510, 320, 240}));
 }
 
 }  // namespace

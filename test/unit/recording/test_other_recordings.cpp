@@ -7,6 +7,7 @@
 #include "compression.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/recording/recording_files.hpp"
+#include "pocd/recording/ros_messages.hpp"
 #include "recorded_run.hpp"
 
 namespace pocd::recording {
@@ -216,6 +217,30 @@ TEST(OtherRecordings, WhatIsThereUnderOtherNamesIsSaidWithTheOption) {
                    "'node.topics.odometry=rt/{robot}/odometry/filtered'"));
   // A robot without masks is none that has them elsewhere.
   EXPECT_EQ(all_of(*renamed("/a/segmentation", "/a/color/image_raw")), "");
+}
+
+TEST(OtherRecordings, OfACameraInfoDistortionAndProjectionAreRead) {
+  const auto payload = [](double k1) {
+    CdrWriter out;
+    put_header(out, 5, "camera");
+    for (const std::uint32_t side : {6u, 8u}) out.number(side);
+    out.string("plumb_bob");
+    out.number(std::uint32_t{5});
+    for (const double d : {k1, 0.0, 0.0, 0.0, 0.0}) out.number(d);
+    for (const double k : {5.0, 0.0, 3.5, 0.0, 5.0, 2.5, 0.0, 0.0, 1.0}) out.number(k);
+    for (int i = 0; i < 9; ++i) out.number(0.0);
+    for (const double p : {4.0, 0.0, 3.0, 0.0, 0.0, 4.5, 2.0, 0.0, 0.0, 0.0, 1.0, 0.0})
+      out.number(p);
+    for (int i = 0; i < 6; ++i) out.number(std::uint32_t{0});
+    out.number(std::uint8_t{0});
+    return out.bytes();
+  };
+  const auto camera_of = [&](double k1) {
+    const Bytes bytes = payload(k1);
+    return *camera_model(decode_camera_info(bytes.data(), bytes.size()).fields).value;
+  };
+  EXPECT_EQ(camera_of(-0.3), (CameraModel{8, 6, 4, 4.5, 3, 2}));
+  EXPECT_EQ(camera_of(0.0), (CameraModel{8, 6, 5, 5, 3.5, 2.5}));
 }
 
 TEST(OtherRecordings, AFileThatIsMovedBehindAnotherIsSaid) {

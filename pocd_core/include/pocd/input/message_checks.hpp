@@ -77,18 +77,19 @@ Checked<LabelImage> label_image(const ImageView& image, const LabelTable& labels
 std::optional<cv::Mat> resized_to(const cv::Mat& image, int width, int height);
 
 /// Fields of sensor_msgs/CameraInfo, of the full image, row-major: `k` as the lens makes it, `p` of
-/// the rectified image (all 0: not given).
+/// the rectified image (all 0: not given); `distorted`: `d` has a coefficient that is not 0.
 struct CameraInfoFields {
   std::uint32_t width = 0, height = 0;
   std::array<double, 9> k{};
   std::array<double, 12> p{};
+  bool distorted = false;
   std::uint32_t binning_x = 0, binning_y = 0;  ///< 0 is 1
   std::uint32_t roi_x = 0, roi_y = 0;
   std::uint32_t roi_width = 0, roi_height = 0;  ///< 0: all
 };
 /// The camera of the image that is sent: the region of interest, binned (as image_geometry does).
-/// Depth images are rectified, so `p` says what they are projected by; where it says nothing
-/// usable, `k`.
+/// Depth images are rectified: of a lens that distorts, `p` says what they are projected by;
+/// without distortion `k` says the same. Where the one says nothing usable, it is the other.
 Checked<CameraModel> camera_model(const CameraInfoFields& info);
 
 /// Names are there (a leading slash is left out, as tf2 does), values finite, the quaternion a unit
