@@ -296,9 +296,16 @@ std::string instead_of(InputStream stream, const RobotConfig& robot, const Input
                        const std::vector<TopicInfo>& topics) {
   const bool pose = stream != InputStream::kCameraInfo && stream != InputStream::kSegmentation;
   const InputTopics used(input);  // and so no news, whoever's they are
+  const auto is_of_another = [&](const std::string& topic) {
+    const Parts parts = parts_of(topic);
+    return std::any_of(input.robots.begin(), input.robots.end(), [&](const RobotConfig& other) {
+      return other.name != robot.name &&
+             std::find(parts.begin(), parts.end(), other.name) != parts.end();
+    });
+  };
   const auto is = [](const TopicInfo& info, InputStream of) { return info.type == ros_type(of); };
   const auto fits = [&](const TopicInfo& info) {
-    if (!used.find(info.topic).empty()) return false;
+    if (!used.find(info.topic).empty() || is_of_another(info.topic)) return false;
     if (stream == InputStream::kSegmentation) return is_mask(info);
     return is(info, stream) || (pose && is(info, InputStream::kTf));
   };

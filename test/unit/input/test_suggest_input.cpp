@@ -218,6 +218,9 @@ TEST(SuggestInput, WhatAStreamHasInsteadIsListedWithTheOption) {
   input.robots = {robot};
   EXPECT_EQ(instead(InputStream::kCameraInfo),
             "there is rt/info; try --set 'node.topics.camera_info=rt/info'");
+  robot.name = "b";
+  EXPECT_EQ(instead(InputStream::kSegmentation), "") << "that of a named robot is not another's";
+  robot.name = "a";
   input.topics.camera_info = "rt/info";
   EXPECT_EQ(instead(InputStream::kCameraInfo), "") << "it is what is looked at";
 }
