@@ -32,7 +32,7 @@ Intrinsics intrinsics_of(const CameraInfoFields& info) {
   const auto usable = [](const Intrinsics& i) {
     return i.fx > 0.0 && i.fy > 0.0 && std::isfinite(i.fx + i.fy + i.cx + i.cy);
   };
-  return usable(rectified) && (info.distorted || !usable(lens)) ? rectified : lens;
+  return info.distorted && usable(lens) && usable(rectified) ? rectified : lens;
 }
 
 }  // namespace

@@ -88,8 +88,8 @@ struct CameraInfoFields {
   std::uint32_t roi_width = 0, roi_height = 0;  ///< 0: all
 };
 /// The camera of the image that is sent: the region of interest, binned (as image_geometry does).
-/// Depth images are rectified: of a lens that distorts, `p` says what they are projected by;
-/// without distortion `k` says the same. Where the one says nothing usable, it is the other.
+/// Depth images are rectified: of a lens that distorts, `p` says what they are projected by, where
+/// it is given; without distortion `k` says the same, and counts.
 Checked<CameraModel> camera_model(const CameraInfoFields& info);
 
 /// Names are there (a leading slash is left out, as tf2 does), values finite, the quaternion a unit
