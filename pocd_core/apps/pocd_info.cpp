@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "pocd/common/check.hpp"
+#include "pocd/input/suggest_input.hpp"
 #include "pocd/recording/recording_files.hpp"
 
 namespace {
@@ -75,6 +76,26 @@ void print(const std::filesystem::path& file, const RecordingReader& reader) {
   }
 }
 
+/// A configuration for the cameras in these recordings, on stdout. False: none is in them.
+bool suggest(const std::vector<std::filesystem::path>& inputs) {
+  std::vector<pocd::TopicInfo> topics;
+  for (const auto& input : inputs) {
+    for (const auto& file : recording_files(input)) {
+      const auto reader = open_recording(file);
+      for (const RecordedChannel& channel : reader->channels()) {
+        if (channel.messages == 0) continue;
+        topics.push_back({pocd::bus_name(channel.topic), pocd::ros_type_name(channel.type)});
+      }
+    }
+  }
+  const std::vector<pocd::RobotConfig> robots = pocd::suggest_robots(topics);
+  std::cout << pocd::suggestion_yaml(robots);
+  if (robots.empty()) {
+    std::cerr << "pocd_info: no depth images: " << printable(pocd::suggestion_text(topics)) << '\n';
+  }
+  return !robots.empty();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -84,10 +105,13 @@ int main(int argc, char** argv) {
       "Exit code: 0 whole, 1 damaged or unreadable, 2 usage.",
       "pocd_info");
   std::vector<std::filesystem::path> inputs;
-  bool verify = false;
+  bool verify = false, suggested = false;
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("FILE", inputs, "Files, or folders of them")->required();
   app.add_flag("--verify", verify, "Read every chunk and check its CRC");
+  app.add_flag("--suggest", suggested,
+               "Only print a configuration for the cameras in them (--config of pocd_map and "
+               "pocd_node)");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -95,6 +119,7 @@ int main(int argc, char** argv) {
   }
   bool whole = true;
   try {
+    if (suggested) return suggest(inputs) && std::cout.flush() ? 0 : 1;
     for (const auto& input : inputs) {
       for (const auto& file : recording_files(input)) {
         const auto reader = open_recording(file);

@@ -60,7 +60,7 @@ Findings check_configuration(const DoctorOptions& options, NodeFile& config) {
 class Progress {
  public:
   void look(const BusPicture& bus, const IntakeStatus& intake) {
-    for (const auto& [key, endpoint] : bus.all()) {
+    for (const BusEndpoint& endpoint : bus.all()) {
       if (endpoint.writer) say(endpoint.topic + ": is announced");
     }
     for (const RobotStatus& robot : intake.robots) {

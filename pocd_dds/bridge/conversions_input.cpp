@@ -1,5 +1,7 @@
 #include "pocd_dds/bridge/conversions.hpp"
 
+#include <algorithm>
+
 namespace pocd::dds {
 namespace {
 
@@ -35,6 +37,9 @@ Checked<CameraModel> camera_from(const sensor_msgs::msg::CameraInfo& info) {
   fields.width = info.width();
   fields.height = info.height();
   fields.k = info.k();
+  fields.p = info.p();
+  fields.distorted =
+      std::any_of(info.d().begin(), info.d().end(), [](double value) { return value != 0.0; });
   fields.binning_x = info.binning_x();
   fields.binning_y = info.binning_y();
   fields.roi_x = info.roi().x_offset();

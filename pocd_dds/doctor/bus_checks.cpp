@@ -40,8 +40,14 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
+std::string with(const std::string& advice, const std::string& more) {
+  return more.empty() ? advice : advice + "; " + more;
+}
+
 /// What to do about a topic that nobody announces.
-std::string advice_for(const BusPicture& bus, const std::string& topic, InputStream stream) {
+std::string advice_for(const BusPicture& bus, const RobotConfig& robot, const NodeConfig& node,
+                       InputStream stream) {
+  const std::string topic = topic_of(node, robot, stream);
   if (topic.compare(0, 3, "rt/") == 0) {
     for (const std::string& bare : {topic.substr(3), topic.substr(2)}) {
       if (bus.endpoints(bare, true).empty()) continue;
@@ -50,11 +56,9 @@ std::string advice_for(const BusPicture& bus, const std::string& topic, InputStr
              "to the topic in the group `node`, or announce it as ROS 2 does";
     }
   }
-  if (stream == InputStream::kDepth) {
-    return "start the sender, or correct the name in the group `node.topics`; " +
-           suggestion_text(bus.topics());
-  }
-  return "start the sender, or correct the name in the group `node.topics`";
+  return with("start the sender, or correct the name in the group `node.topics`",
+              stream == InputStream::kDepth ? suggestion_text(bus.topics())
+                                            : instead_of(stream, robot, node, bus.topics()));
 }
 
 void check_writers(const std::vector<BusEndpoint>& writers, const std::string& topic,
@@ -91,7 +95,7 @@ void check_robot(const BusPicture& bus, const RobotConfig& robot, const NodeConf
     const auto writers = bus.endpoints(topic, true);
     if (writers.empty()) {
       findings.push_back({expected.if_missing, topic, "nobody announces it: " + expected.lacking,
-                          advice_for(bus, topic, expected.stream)});
+                          advice_for(bus, robot, node, expected.stream)});
     }
     const TopicSpec spec = spec_of(expected.stream, topic);
     check_writers(writers, topic, spec, input_delivery(spec, node).reliable, findings);
@@ -100,9 +104,11 @@ void check_robot(const BusPicture& bus, const RobotConfig& robot, const NodeConf
   const std::string tf = topic_of(node, robot, InputStream::kTf);
   const auto poses = bus.endpoints(odometry, true), transforms = bus.endpoints(tf, true);
   if (poses.empty() && transforms.empty()) {
-    findings.push_back({Severity::kError, odometry,
-                        "nobody announces it, nor " + tf + ": " + robot.name + " has no pose",
-                        "start odometry or localisation, or correct the names in `node.topics`"});
+    findings.push_back(
+        {Severity::kError, odometry,
+         "nobody announces it, nor " + tf + ": " + robot.name + " has no pose",
+         with("start odometry or localisation, or correct the names in `node.topics`",
+              instead_of(InputStream::kOdometry, robot, node, bus.topics()))});
   }
   check_writers(poses, odometry, topics::kOdometry,
                 input_delivery(topics::kOdometry, node).reliable, findings);
@@ -112,7 +118,7 @@ void check_robot(const BusPicture& bus, const RobotConfig& robot, const NodeConf
 /// Robots whose topics lack the prefix of ROS 2.
 void find_bare_robots(const BusPicture& bus, const std::string& pattern, Findings& findings) {
   if (pattern.compare(0, 3, "rt/") != 0) return;
-  for (const auto& [key, endpoint] : bus.all()) {
+  for (const BusEndpoint& endpoint : bus.all()) {
     const bool bare = endpoint.writer && (robot_in(pattern.substr(3), endpoint.topic) ||
                                           robot_in(pattern.substr(2), endpoint.topic));
     if (!bare) continue;
@@ -132,6 +138,9 @@ std::string advice_for(const std::string& reason) {
   }
   if (is(InputReason::kUnlistedClass)) return "complete classes.list, or correct the network's ids";
   if (is(InputReason::kNoUsableDepth)) return "see node.depth_scale and map.max_depth_m";
+  if (is(InputReason::kOtherFrame)) {
+    return "register it to depth, or send it with the frame of the depth images";
+  }
   if (is(InputReason::kNoPose)) return "one clock for camera and poses; poses as often as images";
   if (is(InputReason::kNoTransform)) {
     return "send the transform, on tf or latched on tf_static, or give the robot a mount";
@@ -146,9 +155,14 @@ void BusPicture::hear(const BusEvent& event) {
   switch (event.kind) {
     case BusEvent::Kind::kEndpoint:
       endpoints_[event.endpoint.key] = event.endpoint;
+      gone_.erase({event.endpoint.topic, event.endpoint.writer});
       break;
     case BusEvent::Kind::kEndpointGone:
-      endpoints_.erase(event.endpoint.key);
+      if (const auto known = endpoints_.find(event.endpoint.key); known != endpoints_.end()) {
+        const BusEndpoint last = known->second;
+        endpoints_.erase(known);
+        if (endpoints(last.topic, last.writer).empty()) gone_[{last.topic, last.writer}] = last;
+      }
       break;
     case BusEvent::Kind::kParticipant:
       participants_[event.participant] = event.participant_name;
@@ -160,9 +174,16 @@ void BusPicture::hear(const BusEvent& event) {
   }
 }
 
+std::vector<BusEndpoint> BusPicture::all() const {
+  std::vector<BusEndpoint> list;
+  for (const auto& [key, endpoint] : endpoints_) list.push_back(endpoint);
+  for (const auto& [topic, endpoint] : gone_) list.push_back(endpoint);
+  return list;
+}
+
 std::vector<BusEndpoint> BusPicture::endpoints(const std::string& topic, bool writers) const {
   std::vector<BusEndpoint> list;
-  for (const auto& [key, endpoint] : endpoints_) {
+  for (const BusEndpoint& endpoint : all()) {
     if (endpoint.writer == writers && endpoint.topic == topic) list.push_back(endpoint);
   }
   return list;
@@ -170,7 +191,7 @@ std::vector<BusEndpoint> BusPicture::endpoints(const std::string& topic, bool wr
 
 std::vector<TopicInfo> BusPicture::topics() const {
   std::vector<TopicInfo> list;
-  for (const auto& [key, endpoint] : endpoints_) {
+  for (const BusEndpoint& endpoint : all()) {
     if (endpoint.writer) list.push_back({endpoint.topic, ros_type_name(endpoint.type)});
   }
   std::sort(list.begin(), list.end(),
@@ -184,7 +205,7 @@ Findings check_topics(const BusPicture& bus, const NodeConfig& node) {
   for (const RobotConfig& robot : node.robots) robots[robot.name] = robot;
   const std::string pattern = bus_name(node.topics.depth);
   if (node.discovers()) {
-    for (const auto& [key, endpoint] : bus.all()) {
+    for (const BusEndpoint& endpoint : bus.all()) {
       const std::string name =
           endpoint.writer ? robot_in(pattern, endpoint.topic).value_or("") : "";
       if (!name.empty()) robots.emplace(name, RobotConfig{}).first->second.name = name;

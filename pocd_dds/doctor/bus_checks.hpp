@@ -3,6 +3,8 @@
 
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "pocd/config/node_config.hpp"
 #include "pocd/input/suggest_input.hpp"
@@ -12,7 +14,8 @@
 
 namespace pocd::dds {
 
-/// All that discovery has told so far.
+/// All that discovery has told so far. A writer or reader that has gone counts as long as no other
+/// one has its topic: drivers that restart, and players that begin anew, are there all the same.
 class BusPicture {
  public:
   void hear(const BusEvent& event);
@@ -20,13 +23,14 @@ class BusPicture {
   const std::map<ParticipantKey, std::string>& participants() const { return participants_; }
   /// Writers or readers of a topic.
   std::vector<BusEndpoint> endpoints(const std::string& topic, bool writers) const;
-  const std::map<EndpointKey, BusEndpoint>& all() const { return endpoints_; }
+  std::vector<BusEndpoint> all() const;
   /// Of all writers, by name.
   std::vector<TopicInfo> topics() const;
 
  private:
   std::map<ParticipantKey, std::string> participants_;
   std::map<EndpointKey, BusEndpoint> endpoints_;
+  std::map<std::pair<std::string, bool>, BusEndpoint> gone_;  // by topic, and whether it wrote
 };
 
 /// Topics, types and quality of service of every robot that is named or was found.

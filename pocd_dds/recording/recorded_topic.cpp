@@ -1,9 +1,11 @@
 #include "pocd_dds/recording/recorded_topic.hpp"
 
 #include <fnmatch.h>
+#include <strings.h>
 
 #include <algorithm>
 
+#include "pocd/input/suggest_input.hpp"
 #include "pocd/recording/cdr.hpp"
 
 namespace pocd::dds {
@@ -50,14 +52,9 @@ std::string value_of(const std::string& text, const std::string& key) {
 
 /// rosbag2 wrote numbers up to Iron, and names since Jazzy.
 bool any_is(const std::vector<std::string>& values, const char* number, const char* name) {
-  return std::any_of(values.begin(), values.end(),
-                     [&](const std::string& value) { return value == number || value == name; });
-}
-
-/// Topics that everybody latches, for recordings that say nothing.
-bool is_latched_by_custom(const std::string& topic) {
-  const std::string last = topic.substr(topic.rfind('/') + 1);
-  return last == "tf_static" || last == "robot_description" || last == "map";
+  return std::any_of(values.begin(), values.end(), [&](const std::string& value) {
+    return value == number || ::strcasecmp(value.c_str(), name) == 0;
+  });
 }
 
 std::string metadata(const RecordedChannel& channel, const std::string& key) {
@@ -78,13 +75,25 @@ void read_qos(const RecordedChannel& channel, RecordedTopic& topic) {
   // Of several writers, what satisfies most readers.
   const std::vector<std::string> reliability = values_of(offered, "reliability");
   const std::vector<std::string> durability = values_of(offered, "durability");
-  const auto best_effort = [](const std::string& value) {
-    return value == "2" || value == "best_effort";
-  };
-  topic.reliable =
-      reliability.empty() || !std::all_of(reliability.begin(), reliability.end(), best_effort);
-  topic.transient_local = durability.empty() ? is_latched_by_custom(channel.topic)
-                                             : any_is(durability, "1", "transient_local");
+  topic.reliable = reliability.empty() ||
+                   !std::all_of(reliability.begin(), reliability.end(), [](const auto& value) {
+                     return any_is({value}, "2", "best_effort");
+                   });
+  // Other words (system_default, unknown, best_available) say nothing.
+  topic.transient_local =
+      any_is(durability, "1", "transient_local") ||
+      (!any_is(durability, "2", "volatile") && is_latched_by_custom(channel.topic));
+}
+
+/// "rt/a" for "/a"; for a type by its name in ROS the one that it has on the bus.
+std::string bus_topic(const std::string& topic) {
+  return topic.rfind('/', 0) == 0 ? "rt" + topic : topic;
+}
+std::string bus_type(const std::string& recorded) {
+  if (recorded.find("::dds_::") != std::string::npos) return recorded;
+  std::string type = replaced(ros_type_name(recorded), "/", "::");
+  const std::size_t at = type.rfind("::");
+  return at == std::string::npos ? type : type.substr(0, at) + "::dds_" + type.substr(at) + "_";
 }
 
 /// "a|b", or "guid:a|b;guid:a|b" as eProsima's recorder writes them.
@@ -102,6 +111,11 @@ std::vector<std::string> read_partitions(std::string text) {
 }
 
 }  // namespace
+
+bool is_latched_by_custom(const std::string& topic) {
+  const std::string last = topic.substr(topic.rfind('/') + 1);
+  return last == "tf_static" || last == "robot_description" || last == "map";
+}
 
 KeyOf key_of(const std::string& dds_type) {
   const std::string plain = plain_type(dds_type);
@@ -154,11 +168,8 @@ std::optional<RecordedTopic> topic_of(const RecordedChannel& channel) {
   topic.name = channel.topic;
   topic.type = channel.type;
   if (metadata(channel, "ros2-types") == "false") return topic;
-  if (topic.name.rfind('/', 0) == 0) topic.name = "rt" + topic.name;
-  topic.type = replaced(topic.type, "/", "::");
-  const std::size_t at = topic.type.rfind("::");
-  if (at != std::string::npos)
-    topic.type = topic.type.substr(0, at) + "::dds_" + topic.type.substr(at) + "_";
+  topic.name = bus_topic(channel.topic);
+  topic.type = bus_type(channel.type);
   return topic;
 }
 

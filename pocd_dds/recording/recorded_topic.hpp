@@ -32,6 +32,9 @@ std::string recorded_name(const std::string& dds_topic);
 recording::SchemaText schema_of(const RecordedTopic& topic);
 std::map<std::string, std::string> metadata_of(const RecordedTopic& topic);
 
+/// Topics that everybody latches, for recordings that say nothing of it.
+bool is_latched_by_custom(const std::string& topic);
+
 /// In the metadata of a channel that the recorder has made of another one, whose name it is: it was
 /// on no bus and is not played.
 inline constexpr const char* kMadeOf = "made_of";

@@ -77,7 +77,15 @@ RecordedTopic ReplayTopics::renamed(RecordedTopic topic) const {
 void ReplayTopics::add(const recording::RecordedChannel& channel) {
   if (!instances_of(channel).empty()) return;
   const std::optional<RecordedTopic> topic = topic_of(channel);
-  if (!topic) return;
+  if (!topic) {
+    if (channel.message_encoding == "cdr" || !told_.insert(channel.topic).second) return;
+    spdlog::warn("{}: is not played: its messages are in \"{}\", only cdr is played{}",
+                 channel.topic, channel.message_encoding,
+                 channel.message_encoding == "ros1"
+                     ? "; a recording of ROS 1 has to be converted (rosbags-convert)"
+                     : "");
+    return;
+  }
   recorded_.push_back(*topic);
   if (!selected(*topic)) return;
   RecordedTopic offered = *topic;
@@ -87,6 +95,14 @@ void ReplayTopics::add(const recording::RecordedChannel& channel) {
   }
   if (std::any_of(options_.no_latch.begin(), options_.no_latch.end(), matches)) {
     offered.transient_local = false;
+  }
+  const bool wanted_so = std::any_of(options_.no_latch.begin(), options_.no_latch.end(), matches);
+  if (is_latched_by_custom(topic->name) && !offered.transient_local && !wanted_so &&
+      told_.insert(topic->name).second) {
+    const std::string name = recorded_name(topic->name);
+    spdlog::warn(
+        "{}: was recorded volatile: who asks for latched messages does not hear it (--latch {})",
+        name, name);
   }
   const auto [entry, fresh] = played_.try_emplace({topic->name, topic->partitions}, offered);
   if (!fresh && entry->second.type != topic->type) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,7 @@ class ReplayTopics {
   const ReplayOptions& options_;
   std::vector<RecordedTopic> recorded_;  // selected or not
   std::map<Key, RecordedTopic> played_;
+  std::set<std::string> told_;  // topics that something was said about
 };
 
 }  // namespace pocd::dds

@@ -120,6 +120,9 @@ TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
   ImageWriter bare(bus, dds::topics::kDepth, "robot1/depth/image_raw", kTestDelivery);
   ImageWriter other(bus, dds::topics::kDepth, "rt/robot1/front/depth/image_rect_raw",
                     kTestDelivery);
+  ImageWriter masks(bus, dds::topics::kSegmentation, "rt/robot1/semantic/image", kTestDelivery);
+  dds::Writer<nav_msgs::msg::OdometryPubSubType> poses(bus, dds::topics::kOdometry, "rt/poses",
+                                                       kTestDelivery);
   using namespace eprosima::fastdds::dds;  // NOLINT: our own writers are in no partition
   const auto use = bus->topic("rt/robot3/depth/image_raw",
                               TypeSupport(new dds::GuardedType<sensor_msgs::msg::ImagePubSubType>));
@@ -133,7 +136,8 @@ TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
   const CommandResult result = ask(
       doctor, [](StampNs) {},
       {"robot1/depth/image_raw: is announced", "rt/robot1/front/depth/image_rect_raw: is announced",
-       "rt/robot3/depth/image_raw: is announced"});
+       "rt/robot3/depth/image_raw: is announced", "rt/robot1/semantic/image: is announced",
+       "rt/poses: is announced"});
   publisher->delete_datawriter(apart);
   bus->get()->delete_publisher(publisher);
   EXPECT_EQ(result.exit_code, 1);
@@ -141,7 +145,10 @@ TEST(Doctor, NamesTopicsThatAreBesideTheExpectedOnes) {
        {"there is robot1/depth/image_raw, without rt/",
         "is in the partition \"cameras\": not heard",
         "image topics are: robot1/depth/image_raw, rt/robot1/front/depth/image_rect_raw",
-        "--set 'node.topics.depth="}) {
+        "--set 'node.topics.depth=", "note: rt/robot1/segmentation: nobody announces it",
+        "there is rt/robot1/semantic/image; try --set "
+        "'node.topics.segmentation=rt/{robot}/semantic/image'",
+        "there is rt/poses (nav_msgs/msg/Odometry); try --set 'node.topics.odometry=rt/poses'"}) {
     EXPECT_NE(result.out.find(part), std::string::npos) << part << "\n" << result.out;
   }
 }

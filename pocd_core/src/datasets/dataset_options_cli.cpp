@@ -126,7 +126,8 @@ void add_topic_options(CLI::App& app, std::vector<std::string>& overrides) {
     app.add_option_function<std::string>(
            flag,
            [&overrides, key](const std::string& topic) {
-             overrides.push_back("node.topics." + key + "=" + topic);
+             // In quotes: text that begins with {robot} would be a group of keys.
+             overrides.push_back("node.topics." + key + "=\"" + topic + "\"");
            },
            "Short for --set node.topics." + key + "=TOPIC; {robot} stands for any name (mcap)")
         ->group("Frames");

@@ -5,6 +5,7 @@
 #include <pcl/io/pcd_io.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -123,6 +124,8 @@ std::size_t bytes_of(unsigned type) {
     case pcl::PCLPointField::UINT32:
     case pcl::PCLPointField::FLOAT32:
       return 4;
+    case pcl::PCLPointField::INT64:
+    case pcl::PCLPointField::UINT64:
     case pcl::PCLPointField::FLOAT64:
       return 8;
     default:
@@ -130,18 +133,35 @@ std::size_t bytes_of(unsigned type) {
   }
 }
 
-/// A field of one number of any type; null when there is none of that name.
-const pcl::PCLPointField* number_field(const pcl::PCLPointCloud2& cloud, const std::string& name,
-                                       const fs::path& file) {
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+/// The field `label` or `labels`, one number of any type; null when there is none.
+const pcl::PCLPointField* label_field(const pcl::PCLPointCloud2& cloud, const fs::path& file) {
   for (const pcl::PCLPointField& field : cloud.fields) {
-    if (field.name != name) continue;
+    const std::string name = lower(field.name);
+    if (name != "label" && name != "labels") continue;
     const std::size_t bytes = bytes_of(field.datatype);
     if (bytes > 0 && field.count <= 1 && field.offset + bytes <= cloud.point_step) return &field;
-    throw InputError(file.string() + ": field " + name + " has type " +
+    throw InputError(file.string() + ": field " + field.name + " has type " +
                      std::to_string(field.datatype) + " and count " + std::to_string(field.count) +
                      ", expected one number");
   }
   return nullptr;
+}
+
+/// A field of whole numbers that may be meant as labels; "" when there is none.
+std::string like_labels(const pcl::PCLPointCloud2& cloud) {
+  for (const pcl::PCLPointField& field : cloud.fields) {
+    const std::string name = lower(field.name);
+    for (const char* word : {"label", "class", "semantic", "segment", "instance", "object"}) {
+      if (name.find(word) != std::string::npos) return field.name;
+    }
+  }
+  return "";
 }
 
 /// A field of four bytes that lies within the point.
@@ -181,8 +201,8 @@ T value_at(const std::uint8_t* point, const pcl::PCLPointField* field) {
   return value;
 }
 
-/// The label of a point, whatever its type; what is no label (negative, not finite, not in 32 bits)
-/// is 0, invalid.
+/// The label of a point, whatever its type; what is no label (negative, not finite) is 0, invalid,
+/// and one beyond 31 bits is the largest one.
 std::uint32_t label_at(const std::uint8_t* point, const pcl::PCLPointField* field) {
   double value = 0.0;
   switch (field->datatype) {
@@ -202,14 +222,22 @@ std::uint32_t label_at(const std::uint8_t* point, const pcl::PCLPointField* fiel
       value = value_at<std::int32_t>(point, field);
       break;
     case pcl::PCLPointField::UINT32:
-      return value_at<std::uint32_t>(point, field);
+      value = value_at<std::uint32_t>(point, field);
+      break;
+    case pcl::PCLPointField::INT64:
+      value = static_cast<double>(value_at<std::int64_t>(point, field));
+      break;
+    case pcl::PCLPointField::UINT64:
+      value = static_cast<double>(value_at<std::uint64_t>(point, field));
+      break;
     case pcl::PCLPointField::FLOAT32:
       value = static_cast<double>(value_at<float>(point, field));
       break;
     default:
       value = value_at<double>(point, field);
   }
-  return value >= 1.0 && value <= 2147483647.0 ? static_cast<std::uint32_t>(value) : 0;
+  if (!std::isfinite(value) || value < 1.0) return 0;
+  return static_cast<std::uint32_t>(std::min(value, 2147483647.0));
 }
 
 }  // namespace
@@ -222,7 +250,7 @@ PcdImages read_pcd(const fs::path& file) {
       !field_of(cloud, "y", pcl::PCLPointField::FLOAT32)) {
     throw InputError(file.string() + ": has no float fields x y z");
   }
-  const auto* label = number_field(cloud, "label", file);
+  const auto* label = label_field(cloud, file);
   const pcl::PCLPointField* color = nullptr;
   for (const char* name : {"rgba", "rgb"}) {
     for (const unsigned type : {pcl::PCLPointField::UINT32, pcl::PCLPointField::FLOAT32}) {
@@ -231,6 +259,7 @@ PcdImages read_pcd(const fs::path& file) {
   }
   const int rows = static_cast<int>(cloud.height), cols = static_cast<int>(cloud.width);
   PcdImages out;
+  if (!label) out.unread_labels = like_labels(cloud);
   out.depth_m.create(rows, cols, CV_32FC1);
   if (label) out.raw_labels.create(rows, cols, CV_32SC1);
   if (color) out.color.create(rows, cols, CV_8UC3);

@@ -90,8 +90,13 @@ class PcdReader : public DatasetReader {
     std::sort(files_.begin() + static_cast<std::ptrdiff_t>(before), files_.end());
   }
 
-  Frame read(const fs::path& file) const {
+  Frame read(const fs::path& file) {
     const PcdImages images = read_pcd(file);
+    if (!images.unread_labels.empty() && !told_unread_) {
+      told_unread_ = true;
+      problems_.push_back(file.string() + ": has no field label; " + images.unread_labels +
+                          " is not read: call it label");
+    }
     const cv::Mat labels = images.raw_labels.empty()
                                ? cv::Mat()
                                : class_labels(images.raw_labels, label_divisor_, file.string());
@@ -104,6 +109,7 @@ class PcdReader : public DatasetReader {
   Pose T_W_C_;
   std::vector<fs::path> files_;
   std::size_t next_ = 0;
+  bool told_unread_ = false;
   Frame state_;
 };
 

@@ -9,9 +9,9 @@
 #include "pocd/datasets/readers.hpp"
 #include "pocd/input/frame_merger.hpp"
 #include "pocd/input/robot_streams.hpp"
-#include "pocd/input/suggest_input.hpp"
 #include "pocd/recording/recording_files.hpp"
 #include "pocd/recording/ros_messages.hpp"
+#include "recorded_topics.hpp"
 
 namespace pocd {
 namespace {
@@ -23,21 +23,6 @@ using Stream = TimeSynchronizer::Stream;
 constexpr std::size_t kMostBehind = 64;
 // Between two runs: longer than poses are interpolated over.
 constexpr StampNs kPause = 1'000'000'000;
-
-Stream stream_of(InputStream stream) {
-  switch (stream) {
-    case InputStream::kDepth:
-      return Stream::kDepth;
-    case InputStream::kSegmentation:
-      return Stream::kSegmentation;
-    case InputStream::kColor:
-      return Stream::kColor;
-    case InputStream::kCameraInfo:
-      return Stream::kCameraInfo;
-    default:
-      return Stream::kPose;
-  }
-}
 
 class RecordingDataset : public DatasetReader {
  public:
@@ -74,12 +59,14 @@ class RecordingDataset : public DatasetReader {
 
   /// Looks at the channels of all files, so that a robot is known before its first message.
   void find_robots(double max_depth_m) {
-    std::vector<TopicInfo> seen;
     std::set<std::string> robots;
+    std::string damage;
     for (std::size_t i = 0; i < files_.size(); ++i) {
-      for (const RecordedChannel& channel : files_.reader(i).channels()) {
+      const RecordingReader& reader = files_.reader(i);
+      if (!reader.problems().empty()) damage += "; " + reader.problems().front();
+      for (const RecordedChannel& channel : reader.channels()) {
         const std::string topic = bus_name(channel.topic);
-        seen.push_back({topic, channel.type});
+        seen_.push_back({{topic, ros_type_name(channel.type)}, channel.messages > 0});
         for (const InputTopic& to : topics_.find(topic)) {
           if (to.stream != InputStream::kDepth || !fits(channel, to.stream)) continue;
           robots.insert(to.robot);
@@ -90,7 +77,7 @@ class RecordingDataset : public DatasetReader {
     if (robots.empty()) {
       throw InputError(files_.path(0).string() + ": no depth images on " +
                        bus_name(input_.topics.depth) + " (node.topics.depth); " +
-                       suggestion_text(seen));
+                       suggestion_text(recorded_topics(seen_)) + damage);
     }
     const StreamContext context{input_, labels_, max_depth_m, transforms_, counter_};
     for (const std::string& name : robots) {
@@ -105,7 +92,8 @@ class RecordingDataset : public DatasetReader {
     for (const RobotConfig& named : input_.robots) {
       if (robots_.count(named.name) > 0) continue;
       skip(files_.path(0).string() + ": " + named.name + ": no depth images on " +
-           topic_of(input_, named, InputStream::kDepth) + "; " + suggestion_text(seen));
+           topic_of(input_, named, InputStream::kDepth) + "; " +
+           suggestion_text(recorded_topics(seen_)));
     }
     count_what_comes();
   }
@@ -142,11 +130,6 @@ class RecordingDataset : public DatasetReader {
     }
   }
 
-  static bool fits(const RecordedChannel& channel, InputStream stream) {
-    return channel.type == ros_type(stream) ||
-           (is_image(stream) && channel.type == ros_type(stream, true));
-  }
-
   Feeds feeds_of(const RecordedChannel& channel) const {
     Feeds feeds;
     if (channel.message_encoding != "cdr" || channel.metadata.count("instances_of") > 0) return {};
@@ -162,14 +145,7 @@ class RecordingDataset : public DatasetReader {
     if (channel.messages == 0 || channel.metadata.count("instances_of") > 0) return;
     const std::string topic = bus_name(channel.topic);
     for (const InputTopic& to : topics_.find(topic)) {
-      if (!fits(channel, to.stream)) {
-        counter_.count(topic, {InputReason::kWrongType,
-                               "has type " + channel.type + ", expected " + ros_type(to.stream)});
-      } else if (channel.message_encoding != "cdr") {
-        counter_.count(topic,
-                       {InputReason::kWrongType,
-                        "has messages in \"" + channel.message_encoding + "\", expected \"cdr\""});
-      }
+      if (const auto problem = misfit(channel, to.stream)) counter_.count(topic, *problem);
     }
   }
 
@@ -187,11 +163,21 @@ class RecordingDataset : public DatasetReader {
     const std::optional<StampNs> last_ns = last_stamp();
     if (last_ns) {
       const std::optional<StampNs> first_ns = first_stamp();
-      if (first_ns && *first_ns + shift_ns_ <= *last_ns) shift_ns_ = *last_ns + kPause - *first_ns;
+      if (first_ns && *first_ns + shift_ns_ <= *last_ns) {
+        shift_ns_ = *last_ns + kPause - *first_ns;
+        tell_shift(*first_ns);
+      }
     }
     reader_->select([this](const RecordedChannel& channel) { return !feeds_of(channel).empty(); });
     reader_->seek(0);
     return true;
+  }
+
+  void tell_shift(StampNs first_ns) {
+    problems_.push_back(file_ + ": begins at " + std::to_string(first_ns) +
+                        " ns, before the file before it ended: taken as another run, " +
+                        std::to_string(shift_ns_) +
+                        " ns later (of one recording, give the files in their order)");
   }
 
   /// Stamp of the latest depth image of the run so far.
@@ -220,8 +206,8 @@ class RecordingDataset : public DatasetReader {
   }
 
   RosImage image_of(const RecordedMessage& message) const {
-    const bool compressed =
-        reader_->channels()[message.channel].type == ros_type(InputStream::kDepth, true);
+    const bool compressed = ros_type_name(reader_->channels()[message.channel].type) ==
+                            ros_type(InputStream::kDepth, true);
     return compressed ? decode_compressed_image(message.data, message.size)
                       : decode_image(message.data, message.size);
   }
@@ -229,6 +215,10 @@ class RecordingDataset : public DatasetReader {
   void report_damage() {
     for (; reported_ < reader_->problems().size(); ++reported_) {
       problems_.push_back(reader_->problems()[reported_]);
+    }
+    const std::uint64_t untold = reader_->problem_count() - reader_->problems().size();
+    if (untold > 0) {
+      problems_.push_back(file_ + ": " + std::to_string(untold) + " more of its problems");
     }
   }
 
@@ -338,13 +328,20 @@ class RecordingDataset : public DatasetReader {
       problems_.push_back(entry.topic + ": " + entry.reason + ": " + std::to_string(entry.count) +
                           " times in all");
     }
-    if (no_transform && statics_ == 0) {
+    const bool beside = std::any_of(seen_.begin(), seen_.end(), [&](const SeenTopic& topic) {
+      return topic.has_messages && topic.info.type == ros_type(InputStream::kTfStatic) &&
+             topic.info.topic.find("tf_static") != std::string::npos;
+    });
+    if (no_transform && statics_ == 0 && !beside) {
       problems_.push_back(
           bus_name(input_.topics.tf_static) +
           ": the recording has no message on it: it is sent once, at the beginning, "
           "so of a split recording the first part has it");
     }
     for (const auto& [name, robot] : robots_) {
+      for (std::string& line : absent_streams(*robot, input_, seen_)) {
+        problems_.push_back(std::move(line));
+      }
       const std::string losses = robot->losses();
       if (!losses.empty()) problems_.push_back(losses);
       skipped_ += robot->dropped();
@@ -374,6 +371,7 @@ class RecordingDataset : public DatasetReader {
   std::map<std::string, std::unique_ptr<RobotStreams>> robots_;
   std::map<std::pair<std::string, Stream>, std::uint64_t> left_;  // messages still to come
   FrameMerger<Frame> merger_;
+  std::vector<SeenTopic> seen_;  // of all files
   std::size_t frames_listed_ = 0;
   std::uint64_t statics_ = 0;
   std::optional<LiveFrames> live_;

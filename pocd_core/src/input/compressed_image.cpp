@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -183,8 +184,21 @@ cv::Mat metres_of(const cv::Mat& inverse, float a, float b) {
   return depth;
 }
 
+/// As words of a format are found, whatever their case.
 bool has(std::string_view text, std::string_view part) {
-  return text.find(part) != std::string_view::npos;
+  const auto same = [](char a, char b) {
+    return std::tolower(static_cast<unsigned char>(a)) ==
+           std::tolower(static_cast<unsigned char>(b));
+  };
+  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
+}
+
+/// Some write the payload without header, others the header without saying so in the format.
+bool has_header(std::string_view format, const Bytes& bytes) {
+  if (is_png(bytes) || is_jpeg(bytes)) return false;
+  if (has(format, "compressedDepth")) return true;
+  return bytes.size > kDepthHeaderBytes &&
+         is_png({bytes.data + kDepthHeaderBytes, bytes.size - kDepthHeaderBytes});
 }
 
 }  // namespace
@@ -195,8 +209,8 @@ Checked<Picture> decode_picture(const ImageView& image) {
 
 Checked<cv::Mat> decode_depth(const ImageView& image) {
   const std::string_view format = image.encoding;
-  const bool with_header = has(format, "compressedDepth");
   Bytes bytes{image.data, image.size};
+  const bool with_header = has_header(format, bytes);
   float parameters[2] = {0.0f, 0.0f};
   if (with_header) {
     if (image.size <= kDepthHeaderBytes) return damaged(image, "its data ends in the header");

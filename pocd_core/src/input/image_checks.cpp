@@ -14,7 +14,7 @@ namespace {
 
 // Of a field that is text from the bus, in a message about it.
 constexpr std::size_t kLongestQuote = 64;
-constexpr std::size_t kMostUnlisted = 5;
+constexpr std::size_t kMostNamed = 5;
 // How far the colour of a flat patch is off after JPEG: roundings of two transforms of colour, and
 // of the mean of a block.
 constexpr int kJpegTolerance = 12;
@@ -94,6 +94,12 @@ ImageView view_of(const cv::Mat& picture) {
   return view;
 }
 
+template <class Value>
+void name_once(const Value& value, std::vector<Value>& named) {
+  if (named.size() >= kMostNamed) return;
+  if (std::find(named.begin(), named.end(), value) == named.end()) named.push_back(value);
+}
+
 /// Masks are patches of one value: the last lookup is nearly always the next one, too.
 void find_unlisted(const LabelTable& table, LabelImage& image) {
   int last = -1;
@@ -104,11 +110,7 @@ void find_unlisted(const LabelTable& table, LabelImage& image) {
       if (in[col] != last) {
         last = in[col];
         listed = table.known(in[col]);
-        const int id = table.class_of(in[col]);
-        if (!listed && image.unlisted.size() < kMostUnlisted &&
-            std::find(image.unlisted.begin(), image.unlisted.end(), id) == image.unlisted.end()) {
-          image.unlisted.push_back(id);
-        }
+        if (!listed) name_once<std::int64_t>(table.class_of(in[col]), image.unlisted);
       }
       image.unlisted_pixels += !listed;
     }
@@ -131,6 +133,10 @@ Checked<LabelImage> coloured_labels(const ImageView& image, const LabelTable& ta
       if (key != last_key) {
         last_key = key;
         last_value = table.value(r, g, b, tolerance);
+        if (last_value < 0) {
+          name_once(std::to_string(r) + "," + std::to_string(g) + "," + std::to_string(b),
+                    result.unknown);
+        }
       }
       result.unknown_pixels += last_value < 0;
       out[col] = static_cast<std::uint16_t>(last_value < 0 ? 0 : last_value);
@@ -150,6 +156,24 @@ cv::Mat narrowed(const cv::Mat& wide) {
     }
   }
   return labels;
+}
+
+/// By the values that were sent, in place of the one that they became.
+void name_unlisted_wide(const cv::Mat& wide, const LabelTable& table, LabelImage& image) {
+  if (image.unlisted_pixels == 0 || table.known(65535)) return;
+  std::vector<std::int64_t> ids;
+  for (int row = 0; row < wide.rows; ++row) {
+    const auto* in = wide.ptr<std::int32_t>(row);
+    for (int col = 0; col < wide.cols; ++col) {
+      if (in[col] < 0 || in[col] > 65535) name_once<std::int64_t>(in[col], ids);
+    }
+  }
+  if (ids.empty()) return;
+  const std::int64_t became = table.class_of(65535);
+  for (const std::int64_t id : image.unlisted) {
+    if (id != became) name_once(id, ids);
+  }
+  image.unlisted = std::move(ids);
 }
 
 Checked<LabelImage> raw_labels(const ImageView& image, const LabelTable& table, int tolerance) {
@@ -173,6 +197,7 @@ Checked<LabelImage> raw_labels(const ImageView& image, const LabelTable& table, 
     result.labels = narrowed(*copy.value);
   }
   find_unlisted(table, result);
+  if (!bytes && !words) name_unlisted_wide(*copy.value, table, result);
   return result;
 }
 
@@ -216,6 +241,11 @@ Checked<LabelImage> label_image(const ImageView& image, const LabelTable& labels
   Checked<Picture> picture = decode_picture(image);
   if (picture.problem) return std::move(*picture.problem);
   const Picture& decoded = *picture.value;
+  if (decoded.lossy && decoded.pixels.channels() == 1) {
+    return InputProblem{InputReason::kBadCompression,
+                        "format \"" + std::string(image.encoding.substr(0, kLongestQuote)) +
+                            "\": a JPEG changes the ids of classes; send masks as PNG"};
+  }
   return raw_labels(view_of(decoded.pixels), labels, decoded.lossy ? kJpegTolerance : 0);
 }
 

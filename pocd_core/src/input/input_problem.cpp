@@ -60,6 +60,8 @@ const char* to_string(InputReason reason) {
       return "no_mask";
     case InputReason::kNoUsableDepth:
       return "no_usable_depth";
+    case InputReason::kOtherFrame:
+      return "other_frame";
   }
   return "";
 }

@@ -23,6 +23,18 @@ std::uint32_t sent_side(std::uint32_t full, std::uint32_t roi, std::uint32_t bin
   return (roi == 0 ? full : roi) / std::max(binning, 1u);
 }
 
+struct Intrinsics {
+  double fx, fy, cx, cy;
+};
+Intrinsics intrinsics_of(const CameraInfoFields& info) {
+  const Intrinsics lens{info.k[0], info.k[4], info.k[2], info.k[5]};
+  const Intrinsics rectified{info.p[0], info.p[5], info.p[2], info.p[6]};
+  const auto usable = [](const Intrinsics& i) {
+    return i.fx > 0.0 && i.fy > 0.0 && std::isfinite(i.fx + i.fy + i.cx + i.cy);
+  };
+  return info.distorted && usable(lens) && usable(rectified) ? rectified : lens;
+}
+
 }  // namespace
 
 Checked<CameraModel> camera_model(const CameraInfoFields& info) {
@@ -33,20 +45,21 @@ Checked<CameraModel> camera_model(const CameraInfoFields& info) {
     return {InputReason::kBadImageSize,
             "camera info is for " + std::to_string(info.width) + "x" + std::to_string(info.height)};
   }
-  const std::array<double, 9>& k = info.k;
-  for (const double value : k) {
+  const Intrinsics full = intrinsics_of(info);
+  for (const double value : {full.fx, full.fy, full.cx, full.cy}) {
     if (!std::isfinite(value)) return {InputReason::kNotFinite, "k has a value that is not finite"};
   }
   CameraModel camera;
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
   const double bin_x = std::max(info.binning_x, 1u), bin_y = std::max(info.binning_y, 1u);
-  camera.fx = k[0] / bin_x;
-  camera.cx = (k[2] - info.roi_x) / bin_x;
-  camera.fy = k[4] / bin_y;
-  camera.cy = (k[5] - info.roi_y) / bin_y;
+  camera.fx = full.fx / bin_x;
+  camera.cx = (full.cx - info.roi_x) / bin_x;
+  camera.fy = full.fy / bin_y;
+  camera.cy = (full.cy - info.roi_y) / bin_y;
   if (camera.fx <= 0.0 || camera.fy <= 0.0) {
-    return {InputReason::kZeroFocalLength, "fx = " + text(camera.fx) + ", fy = " + text(camera.fy)};
+    return {InputReason::kZeroFocalLength, "fx = " + text(camera.fx) + ", fy = " + text(camera.fy) +
+                                               ": is the camera not calibrated?"};
   }
   if (auto fault = camera_fault(camera); !fault.empty()) {
     return {InputReason::kBadIntrinsics, std::move(fault)};

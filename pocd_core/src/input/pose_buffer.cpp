@@ -43,6 +43,13 @@ StampOrder::Verdict PoseBuffer::add(StampNs stamp_ns, const PoseQuaternion& pose
   return verdict;
 }
 
+std::pair<StampNs, StampNs> PoseBuffer::around(StampNs stamp_ns) const {
+  const auto after = std::lower_bound(entries_.begin(), entries_.end(), stamp_ns,
+                                      [](const Entry& e, StampNs s) { return e.stamp_ns < s; });
+  POCD_CHECK(after != entries_.begin() && after != entries_.end());
+  return {(after - 1)->stamp_ns, after->stamp_ns};
+}
+
 PoseLookup PoseBuffer::at(StampNs stamp_ns, StampNs extrapolation_ns, PoseQuaternion& pose) const {
   if (entries_.empty()) return PoseLookup::kEmpty;
   if (stamp_ns < entries_.front().stamp_ns) return PoseLookup::kTooOld;

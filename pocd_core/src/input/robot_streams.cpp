@@ -127,21 +127,30 @@ std::optional<cv::Mat> RobotStreams::converted(Stream stream, const ImageView& i
     return std::nullopt;
   }
   const LabelImage& mask = *labels.value;
+  const auto share = [&](std::uint64_t pixels) {
+    return "; " + percent(pixels, mask.labels.total()) + " of the pixels";
+  };
   if (mask.unknown_pixels > 0) {
-    context_.problems.count(
-        on,
-        {InputReason::kUnknownColour, "a colour of no class became class 0: " +
-                                          percent(mask.unknown_pixels, mask.labels.total()) +
-                                          " of the pixels"},
-        mask.unknown_pixels);
+    std::string colours;
+    for (const std::string& rgb : mask.unknown) colours += (colours.empty() ? "" : "; ") + rgb;
+    const char* none = context_.labels.has_colours() ? "" : " (no class has an rgb)";
+    context_.problems.count(on,
+                            {InputReason::kUnknownColour,
+                             "colours r,g,b of no class of classes.list" + std::string(none) +
+                                 " became class 0: " + colours + share(mask.unknown_pixels)},
+                            mask.unknown_pixels);
   }
   if (mask.unlisted_pixels > 0) {
     std::string ids;
-    for (const int id : mask.unlisted) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
-    context_.problems.count(
-        on, {InputReason::kUnlistedClass,
-             "ids that are no class of classes.list and so background: " + ids + "; " +
-                 percent(mask.unlisted_pixels, mask.labels.total()) + " of the pixels"});
+    bool large = false;
+    for (const auto id : mask.unlisted) {
+      ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+      large = large || id > 255;
+    }
+    const char* instances = large ? " (of panoptic masks, see classes.label_divisor)" : "";
+    context_.problems.count(on, {InputReason::kUnlistedClass,
+                                 "ids that are no class of classes.list and so background: " + ids +
+                                     share(mask.unlisted_pixels) + instances});
   }
   return mask.labels;
 }
@@ -152,9 +161,23 @@ bool RobotStreams::add_image(Stream stream, StampNs stamp_ns, const std::string&
   std::optional<cv::Mat> pixels = converted(stream, image);
   if (!pixels) return false;
   if (stream == Stream::kDepth && !accept_camera_frame(frame_name(frame))) return false;
+  if (stream == Stream::kDepth) {
+    depth_frame_ = frame_name(frame);
+  } else {
+    compare_frame(stream, frame_name(frame));
+  }
   const auto problem = synchronizer_.add_image(stream, stamp_ns, std::move(*pixels));
   if (problem) context_.problems.count(topic(stream), *problem);
   return !stamp_refused(problem);
+}
+
+/// Masks and colour are of the pixels of the depth image; those of another camera are not.
+void RobotStreams::compare_frame(Stream stream, const std::string& frame) {
+  if (frame.empty() || depth_frame_.empty() || frame == depth_frame_) return;
+  context_.problems.count(topic(stream),
+                          {InputReason::kOtherFrame,
+                           "header.frame_id is \"" + frame + "\", that of the depth images \"" +
+                               depth_frame_ + "\": used as it is, but is it registered to depth?"});
 }
 
 bool RobotStreams::accept_camera_frame(const std::string& frame) {
@@ -266,11 +289,12 @@ void RobotStreams::look_for_depth(const Frame& frame) {
   if (depths.size() >= enough) {
     const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
     std::nth_element(depths.begin(), middle, depths.end());
-    char text[160];
+    char text[260];
     std::snprintf(
         text, sizeof text,
-        "the median depth is %.4g m, none is from %.2g to %.4g m: is the unit another one "
-        "(node.depth_scale, now %g)?",
+        "the median depth is %.4g m, none is from %.2g to %.4g m (map.max_depth_m): is the unit "
+        "another one (--set node.depth_scale=0.1 for tenths of a millimetre, 0.001 for float "
+        "millimetres; now %g)?",
         static_cast<double>(*middle), static_cast<double>(kNearest_m), context_.max_depth_m,
         robot_.depth_scale);
     what = text;
@@ -302,6 +326,7 @@ std::vector<std::string> RobotStreams::restart() {
   own_transforms_.forget_moving();
   if (robot_.camera_frame.empty()) camera_frame_.clear();
   camera_.reset();
+  depth_frame_.clear();
   due_ns_.reset();
   depth_seen_ = false;
   frames_without_depth_ = 0;

@@ -33,7 +33,8 @@ std::optional<InputProblem> stamp_problem(StampOrder::Verdict verdict, StampNs s
       return std::nullopt;
     case StampOrder::Verdict::kRefused:
       return InputProblem{InputReason::kStampBackwards,
-                          "stamp " + stamp + " is not after the last one, " + before};
+                          "stamp " + stamp + " is not after the last one, " + before +
+                              (stamp_ns == 0 ? ": does the sender set no stamps?" : "")};
     case StampOrder::Verdict::kRestarted:
       break;
   }

@@ -1,6 +1,7 @@
 #include "pocd/input/transform_tree.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <set>
@@ -15,9 +16,36 @@ std::string seconds_text(StampNs stamp_ns) {
 }
 
 /// No delay is so long.
-std::string clocks_text(const TransformLookup& failure) {
+std::string clocks_text(const TransformLookup& failure, StampNs stamp_ns) {
   constexpr StampNs kNoDelay = 60'000'000'000;
+  if (stamp_ns == 0 && failure.off_ns > kNoDelay) return ": does the camera set no stamps?";
   return failure.off_ns > kNoDelay ? ": camera and poses have different clocks" : "";
+}
+
+/// Seconds to write into an option: not less than this, to a tenth.
+std::string tenths_above(StampNs ns) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1f", std::ceil(static_cast<double>(ns) * 1e-8) * 0.1);
+  return text;
+}
+
+/// Poses that come seldom, or late, can be held; what is sent once is static.
+std::string held_text(const TransformLookup& failure, const PoseBuffer* poses) {
+  if (poses != nullptr && poses->size() == 1) {
+    return "; it came once: a transform that does not change belongs on tf_static";
+  }
+  constexpr StampNs kLongestHeld = 1'000'000'000;  // of node.extrapolation_s
+  if (failure.off_ns > kLongestHeld) return "";
+  return "; --set node.extrapolation_s=" + tenths_above(failure.off_ns) + " holds that pose";
+}
+
+InputProblem gap_problem(const TransformLookup& failure, const std::pair<StampNs, StampNs>& around,
+                         StampNs stamp_ns) {
+  return {InputReason::kNoPose,
+          failure.edge + ": no pose is between " + seconds_text(around.first) + " and " +
+              seconds_text(around.second) + ", the image is of " + seconds_text(stamp_ns) +
+              " (--set node.max_pose_gap_s=" + tenths_above(around.second - around.first) +
+              " interpolates over so long)"};
 }
 
 InputProblem parent_changed(const std::string& child, const std::string& old_parent,
@@ -112,6 +140,23 @@ const TransformTree::Edge* TransformTree::find(const std::string& child) const {
 
 TransformLookup TransformTree::lookup(const std::string& target, const std::string& source,
                                       StampNs stamp_ns, StampNs extrapolation_ns) const {
+  const TransformLookup straight = climb(target, source, stamp_ns, extrapolation_ns);
+  if (straight.result != PoseLookup::kEmpty || find(target) == nullptr) return straight;
+  const std::vector<std::string> above_source = chain("", source);
+  for (const std::string& common : chain("", target)) {
+    if (std::find(above_source.begin(), above_source.end(), common) == above_source.end()) continue;
+    TransformLookup answer = climb(common, source, stamp_ns, extrapolation_ns);
+    if (answer.result != PoseLookup::kFound) return answer;
+    const TransformLookup of_target = climb(common, target, stamp_ns, extrapolation_ns);
+    if (of_target.result != PoseLookup::kFound) return of_target;
+    answer.T_target_source = of_target.T_target_source.inverse() * answer.T_target_source;
+    return answer;
+  }
+  return straight;
+}
+
+TransformLookup TransformTree::climb(const std::string& target, const std::string& source,
+                                     StampNs stamp_ns, StampNs extrapolation_ns) const {
   TransformLookup answer;
   std::string frame = source;
   const std::size_t most_steps = size();
@@ -123,6 +168,7 @@ TransformLookup TransformTree::lookup(const std::string& target, const std::stri
       return answer;
     }
     answer.edge = edge->parent + " -> " + frame;
+    answer.child = frame;
     if (steps > most_steps) {  // longer than there are edges
       answer.result = PoseLookup::kLoop;
       return answer;
@@ -155,25 +201,36 @@ InputProblem TransformTree::explain(const std::string& target, const std::string
     if (failure.result != PoseLookup::kLoop && edge->parent + " -> " + frame == failure.edge) break;
     frame = edge->parent;
   }
+  // What a robot moves in may be meant as the map.
+  const std::string hint =
+      last != nullptr && !last->is_static
+          ? "; is it the frame of the map? (--set node.map_frame=" + frame + ")"
+          : "";
+  const Edge* failed = find(failure.child);
   switch (failure.result) {
     case PoseLookup::kEmpty:
       return {InputReason::kNoTransform, "no transform leads from \"" + source + "\" to \"" +
                                              target + "\": nobody says where \"" + frame +
-                                             "\" is (" + chain + ")"};
+                                             "\" is (" + chain + ")" + hint};
     case PoseLookup::kLoop:
       return {InputReason::kTransformLoop,
               "frames go round in a loop and never reach \"" + target + "\": " + chain};
     case PoseLookup::kTooNew:
-      return {InputReason::kNoPose,
-              failure.edge + ": newest pose is of " +
-                  (last == nullptr ? std::string("?") : seconds_text(last->buffer.newest_ns())) +
-                  ", the image of " + seconds_text(stamp_ns) + clocks_text(failure)};
+      return {
+          InputReason::kNoPose,
+          failure.edge + ": newest pose is of " +
+              (failed == nullptr ? std::string("?") : seconds_text(failed->buffer.newest_ns())) +
+              ", the image of " + seconds_text(stamp_ns) + clocks_text(failure, stamp_ns) +
+              held_text(failure, failed == nullptr ? nullptr : &failed->buffer)};
     case PoseLookup::kTooOld:
-      return {InputReason::kNoPose,
-              failure.edge + ": oldest pose is of " +
-                  (last == nullptr ? std::string("?") : seconds_text(last->buffer.oldest_ns())) +
-                  ", the image of " + seconds_text(stamp_ns) + clocks_text(failure)};
+      return {
+          InputReason::kNoPose,
+          failure.edge + ": oldest pose is of " +
+              (failed == nullptr ? std::string("?") : seconds_text(failed->buffer.oldest_ns())) +
+              ", the image of " + seconds_text(stamp_ns) + clocks_text(failure, stamp_ns)};
     case PoseLookup::kGap:
+      if (failed != nullptr) return gap_problem(failure, failed->buffer.around(stamp_ns), stamp_ns);
+      break;
     case PoseLookup::kFound:
       break;
   }

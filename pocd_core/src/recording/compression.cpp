@@ -146,9 +146,20 @@ Bytes decompress(const std::string& compression, const std::uint8_t* data, std::
   return Bytes(data, data + size);
 }
 
+namespace {
+
+bool begins_with(const std::uint8_t* data, std::size_t size, const std::uint8_t (&magic)[4]) {
+  return size >= sizeof magic && std::equal(std::begin(magic), std::end(magic), data);
+}
+
+}  // namespace
+
 bool is_zstd(const std::uint8_t* data, std::size_t size) {
-  constexpr std::uint8_t kMagic[] = {0x28, 0xB5, 0x2F, 0xFD};
-  return size >= sizeof kMagic && std::equal(std::begin(kMagic), std::end(kMagic), data);
+  return begins_with(data, size, {0x28, 0xB5, 0x2F, 0xFD});
+}
+
+bool is_lz4(const std::uint8_t* data, std::size_t size) {
+  return begins_with(data, size, {0x04, 0x22, 0x4D, 0x18});
 }
 
 Bytes decompress_message(const std::uint8_t* data, std::size_t size, std::size_t most) {

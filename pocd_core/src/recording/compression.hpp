@@ -19,6 +19,7 @@ Bytes decompress(const std::string& compression, const std::uint8_t* data, std::
 
 /// Whether the bytes begin like a zstd frame.
 bool is_zstd(const std::uint8_t* data, std::size_t size);
+bool is_lz4(const std::uint8_t* data, std::size_t size);
 /// A zstd frame, whether it says how long its content is or not. Throws DamagedData, also for more
 /// than `most` bytes.
 Bytes decompress_message(const std::uint8_t* data, std::size_t size, std::size_t most);

@@ -3,6 +3,8 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <cctype>
+#include <fstream>
 #include <limits>
 
 #include "pocd/common/check.hpp"
@@ -23,12 +25,41 @@ std::string text(sqlite3_stmt* row, int column) {
              : std::string(value, static_cast<std::size_t>(sqlite3_column_bytes(row, column)));
 }
 
+/// Whether SQLite keeps what was written last in a file beside this one (write-ahead log), and that
+/// is not there.
+bool lacks_log(const std::filesystem::path& file) {
+  char header[20] = {};
+  std::ifstream(file, std::ios::binary).read(header, sizeof header);
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(file.string() + "-wal", error);
+  return header[18] == 2 && (error || bytes == 0);
+}
+
+/// A file that SQLite takes as it is. rosbag2 leaves its files in the mode of a log, for which
+/// SQLite otherwise makes files beside them, and cannot where nothing may be written.
+std::string as_it_is(const std::filesystem::path& file) {
+  constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
+      uri += c;
+    } else {
+      uri += {'%', kDigits[byte >> 4], kDigits[byte & 15]};
+    }
+  }
+  return uri + "?immutable=1";
+}
+
 class Db3Reader : public RecordingReader {
  public:
   Db3Reader(const std::filesystem::path& file, const std::string& name, const ReaderLimits& limits)
       : name_(name) {
     sqlite3* raw = nullptr;
-    const int result = sqlite3_open_v2(file.c_str(), &raw, SQLITE_OPEN_READONLY, nullptr);
+    lacks_log_ = lacks_log(file);
+    const std::string target = lacks_log_ ? as_it_is(file) : file.string();
+    const int flags = SQLITE_OPEN_READONLY | (lacks_log_ ? SQLITE_OPEN_URI : 0);
+    const int result = sqlite3_open_v2(target.c_str(), &raw, flags, nullptr);
     database_.reset(raw);
     if (result != SQLITE_OK)
       throw InputError(name_ + ": cannot be opened: " + sqlite3_errstr(result));
@@ -86,7 +117,16 @@ class Db3Reader : public RecordingReader {
   Statement prepare(const char* query) const {
     sqlite3_stmt* statement = nullptr;
     if (sqlite3_prepare_v2(database_.get(), query, -1, &statement, nullptr) != SQLITE_OK) {
-      throw InputError(name_ + ": is no rosbag2 file: " + sqlite3_errmsg(database_.get()));
+      const std::string why = sqlite3_errmsg(database_.get());
+      const int code = sqlite3_errcode(database_.get());
+      if (code == SQLITE_CORRUPT || code == SQLITE_NOTADB) {
+        throw InputError(name_ + ": is damaged or cut off: " + why +
+                         "; sqlite3's .recover may get back what is left");
+      }
+      throw InputError(name_ + ": is no rosbag2 file: " + why +
+                       (lacks_log_ ? "; its recorder was not ended in order: the file of the same "
+                                     "name with -wal belongs to it and must be beside it"
+                                   : ""));
     }
     return Statement(statement);
   }
@@ -142,6 +182,7 @@ class Db3Reader : public RecordingReader {
 
   std::string name_;
   std::unique_ptr<sqlite3, Finalize> database_;
+  bool lacks_log_ = false;
   RecordingInfo info_;
   std::vector<RecordedChannel> channels_;
   std::map<sqlite3_int64, std::size_t> channel_index_;

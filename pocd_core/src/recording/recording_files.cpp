@@ -14,6 +14,30 @@ namespace {
 constexpr char kMetadata[] = "metadata.yaml";
 constexpr std::ptrdiff_t kMostOpen = 64;
 
+/// What the list names, wherever it was made; rosbag2 and its users add and take away `.zstd`.
+fs::path file_beside(const fs::path& metadata, const std::string& name) {
+  const fs::path file = metadata.parent_path() / fs::path(name).filename();
+  if (fs::exists(file)) return file;
+  const fs::path packed = file.string() + ".zstd";
+  if (fs::exists(packed)) return packed;
+  const fs::path unpacked = metadata.parent_path() / file.stem();
+  if (file.extension() == ".zstd" && fs::exists(unpacked)) return unpacked;
+  throw InputError(metadata.string() + ": names " + file.filename().string() +
+                   ", which is not in the folder; give the files that are there themselves");
+}
+
+/// Throws InputError for a compression that only its plugin undoes.
+void check_compression(const YAML::Node& bag, const fs::path& metadata) {
+  const auto text = [&](const char* key) {
+    return bag[key] && bag[key].IsScalar() ? bag[key].as<std::string>() : std::string();
+  };
+  const std::string format = text("compression_format"), mode = text("compression_mode");
+  if (mode.empty() || mode == "NONE" || mode == "none") return;
+  if (format.empty() || format == "none" || format == "zstd") return;
+  throw InputError(metadata.string() + ": compression_format is \"" + format +
+                   "\", only zstd is read: convert it (ros2 bag convert, without compression)");
+}
+
 /// rosbag2's own list; older ones name the files as seen from beside the folder. Nothing when the
 /// file is no such list.
 std::vector<fs::path> listed_files(const fs::path& metadata) {
@@ -21,16 +45,13 @@ std::vector<fs::path> listed_files(const fs::path& metadata) {
   try {
     const YAML::Node top = YAML::LoadFile(metadata.string());
     if (!top.IsMap() || !top["rosbag2_bagfile_information"].IsMap()) return files;
-    for (const YAML::Node& name : top["rosbag2_bagfile_information"]["relative_file_paths"]) {
-      files.push_back(metadata.parent_path() / fs::path(name.as<std::string>()).filename());
+    const YAML::Node bag = top["rosbag2_bagfile_information"];
+    check_compression(bag, metadata);
+    for (const YAML::Node& name : bag["relative_file_paths"]) {
+      files.push_back(file_beside(metadata, name.as<std::string>()));
     }
   } catch (const YAML::Exception& error) {
-    throw InputError(metadata.string() + ": cannot be read: " + error.msg);
-  }
-  for (const fs::path& file : files) {
-    if (fs::exists(file)) continue;
-    throw InputError(metadata.string() + ": names " + file.filename().string() +
-                     ", which is not in the folder; give the files that are there themselves");
+    throw InputError(metadata.string() + ": cannot be read: " + error.what());
   }
   return files;
 }

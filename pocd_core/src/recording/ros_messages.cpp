@@ -59,9 +59,12 @@ RosCameraInfo decode_camera_info(const std::uint8_t* data, std::size_t size) {
   fields.height = in.number<std::uint32_t>();
   fields.width = in.number<std::uint32_t>();
   in.string();  // distortion model
-  for (std::size_t left = in.length(sizeof(double)); left > 0; --left) in.number<double>();
+  for (std::size_t left = in.length(sizeof(double)); left > 0; --left) {
+    fields.distorted = in.number<double>() != 0.0 || fields.distorted;
+  }
   for (double& value : fields.k) value = in.number<double>();
-  for (int i = 0; i < 9 + 12; ++i) in.number<double>();  // r, p
+  for (int i = 0; i < 9; ++i) in.number<double>();  // r
+  for (double& value : fields.p) value = in.number<double>();
   fields.binning_x = in.number<std::uint32_t>();
   fields.binning_y = in.number<std::uint32_t>();
   fields.roi_x = in.number<std::uint32_t>();

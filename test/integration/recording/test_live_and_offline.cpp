@@ -51,6 +51,8 @@ std::vector<Variant> variants() {
   add("plain");
   add("qos_by_name").qos = kLatchedByName;
   add("no_qos").qos = {};
+  add("qos_that_says_nothing").qos = {
+      {"offered_qos_profiles", "- durability: best_available\n  reliability: best_available\n"}};
   add("masks_3ms_off").mask_offset = 3'000'000;
   Variant& off = add("masks_40ms_off");
   off.mask_offset = 40'000'000;
@@ -206,9 +208,32 @@ TEST(LiveAndOffline, OptionsSayWhatIsLatched) {
       {command("pocd_play"), file.string(), "--lossless", "--fast", "--latch", "/tf_static"});
   EXPECT_EQ(played.exit_code, 0) << played.err;
   EXPECT_NE(stop(node).err.find("ended: 20 frames"), std::string::npos);
+  const CommandResult as_recorded =
+      run_command({command("pocd_play"), file.string(), "--fast", "--no-wait"});
+  EXPECT_NE(as_recorded.err.find("/tf_static: was recorded volatile: who asks for latched messages "
+                                 "does not hear it (--latch /tf_static)"),
+            std::string::npos)
+      << as_recorded.err;
   const CommandResult typo = run_command({command("pocd_play"), file.string(), "--latch", "/tff"});
   EXPECT_NE(typo.exit_code, 0);
   EXPECT_NE(typo.err.find("--latch /tff: matches no topic"), std::string::npos) << typo.err;
+}
+
+TEST(LiveAndOffline, MessagesThatAreNotPlayedAreNamed) {
+  const Folder folder;
+  const fs::path file = folder / "run.mcap";
+  {
+    McapWriter writer(file);
+    const auto schema = writer.add_schema("sensor_msgs/Image", "ros1msg", "");
+    writer.add_channel(schema, "/camera/image", "ros1", {});
+    writer.close();
+  }
+  const CommandResult played = run_command({command("pocd_play"), file.string(), "--no-wait"});
+  EXPECT_EQ(played.exit_code, 1);
+  EXPECT_NE(played.err.find("/camera/image: is not played: its messages are in \"ros1\", only cdr "
+                            "is played; a recording of ROS 1 has to be converted"),
+            std::string::npos)
+      << played.err;
 }
 
 }  // namespace

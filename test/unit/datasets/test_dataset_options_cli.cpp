@@ -45,6 +45,15 @@ TEST(DatasetOptionsCli, ReadsAllFlags) {
   EXPECT_EQ(parsed.extrinsics.value().T_B_C.translation(), Eigen::Vector3d(1, 2, 3));
 }
 
+// Without quotes YAML would take it for a group of keys.
+TEST(DatasetOptionsCli, ATopicMayBeginWithTheRobot) {
+  CLI::App app;
+  std::vector<std::string> overrides;
+  add_topic_options(app, overrides);
+  app.parse("--depth-topic {robot}/depth");
+  EXPECT_EQ(overrides, (std::vector<std::string>{"node.topics.depth=\"{robot}/depth\""}));
+}
+
 TEST(DatasetOptionsCli, RefusesWhatIsNoDirection) {
   const std::string input = "--dataset rgbd --input a --gravity=";
   for (const char* bad : {"0,0", "0,0,-9.81", "0,0,0", "0,0,nan", "a,b,c", "0,0,-1,", "0,0,-1,0"}) {

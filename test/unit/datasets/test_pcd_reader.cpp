@@ -64,6 +64,44 @@ TEST(PcdReader, MapsLabelsAndRepeats) {
   EXPECT_EQ(frames[2].color.at<cv::Vec3b>(2, 2), cv::Vec3b(30, 20, 10));
 }
 
+std::string with_field(const std::string& name, const std::string& size, const std::string& type) {
+  std::string text = ascii_pcd(kLabels);
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("FIELDS label", "FIELDS " + name);
+  replace("SIZE 4", "SIZE " + size);
+  replace("TYPE U", "TYPE " + type);
+  return text;
+}
+
+// Eight bytes, too, and in capitals; what is called otherwise is not dropped without a word.
+TEST(PcdReader, LabelsOfEveryTypeAreReadAndOthersAreNamed) {
+  const std::pair<const char*, const char*> types[] = {{"1", "U"}, {"2", "I"}, {"4", "F"},
+                                                       {"8", "I"}, {"8", "U"}, {"8", "F"}};
+  for (const auto& [size, type] : types) {
+    for (const char* name : {"label", "Labels"}) {
+      const ScratchFolder folder;
+      folder.write("a.pcd", with_field(name, size, type));
+      const auto reader = open_dataset(options_for(folder));
+      const std::vector<Frame> frames = read_all(*reader);
+      ASSERT_EQ(frames.size(), 2u) << name << size << type;
+      EXPECT_EQ(frames[0].labels.at<std::uint16_t>(3, 4), 2) << name << size << type;
+      EXPECT_TRUE(reader->problems().empty());
+    }
+  }
+  const ScratchFolder folder;
+  folder.write("a.pcd", with_field("classification", "4", "U"));
+  const auto reader = open_dataset(options_for(folder));
+  const std::vector<Frame> frames = read_all(*reader);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_TRUE(frames[0].labels.empty());
+  ASSERT_EQ(reader->problems().size(), 1u);
+  EXPECT_NE(reader->problems()[0].find(
+                "a.pcd: has no field label; classification is not read: call it label"),
+            std::string::npos);
+}
+
 TEST(PcdReader, KeepsInstances) {
   const ScratchFolder folder;
   folder.write("a.pcd", ascii_pcd(kLabels));

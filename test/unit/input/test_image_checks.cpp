@@ -1,6 +1,7 @@
 // Images as drivers and image_transport send them.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
 #include "pocd/common/random.hpp"
@@ -122,6 +123,19 @@ TEST(DepthImage, CompressedDepthIsReadInAllItsForms) {
   }
 }
 
+// Not everybody writes header and format as image_transport does.
+TEST(DepthImage, CompressedDepthIsReadWhateverItsFormatSays) {
+  const cv::Mat depth(6, 8, CV_16UC1, cv::Scalar(1234));
+  const std::vector<std::uint8_t> png = picture(depth, ".png");
+  for (const char* format : {"", "png", "16UC1; compressedDepth", "16UC1; compresseddepth PNG"}) {
+    for (const auto& data : {png, with_header(0, 0, png)}) {
+      const auto image = depth_image(packed(data, format));
+      ASSERT_TRUE(image.value) << format << ": " << image.problem->detail;
+      EXPECT_TRUE(same(*image.value, depth)) << format;
+    }
+  }
+}
+
 // The parameters of image_transport's default: depths up to 10 m, 100 m of quantisation.
 TEST(DepthImage, InverseDepthIsMetresAgain) {
   const float a = 100.0f * 101.0f, b = 1.0f - a / 10.0f;
@@ -198,6 +212,7 @@ TEST(LabelImage, IdsOf32BitsAreReadAndUnlistedOnesCounted) {
   ASSERT_TRUE(mask.value);
   EXPECT_EQ(mask.value->labels.at<std::uint16_t>(0, 1), 300);
   EXPECT_EQ(mask.value->unlisted_pixels, 2u);
+  EXPECT_EQ(mask.value->unlisted, (std::vector<std::int64_t>{-1, 70000})) << "as they were sent";
   const auto swapped = label_image(raw({0, 0, 0, 7}, 1, 1, 4, "32SC1", true), table);
   ASSERT_TRUE(swapped.value);
   EXPECT_EQ(swapped.value->labels.at<std::uint16_t>(0, 0), 7);
@@ -220,6 +235,20 @@ TEST(LabelImage, PngKeepsIdsAndJpegFindsTheNearestColour) {
   EXPECT_EQ(jpeg.value->labels.at<std::uint16_t>(28, 4), 300);
   // Colour has half the resolution: a row on each side of the edge is a mixture.
   EXPECT_LE(jpeg.value->unknown_pixels, 64u);
+}
+
+TEST(LabelImage, AGreyJpegIsRefusedAndUnknownColoursAreNamed) {
+  const LabelTable table(coloured_classes());
+  const cv::Mat ids(16, 16, CV_8UC1, cv::Scalar(7));
+  const auto jpeg =
+      label_image(packed(picture(ids, ".jpg"), "mono8; jpeg compressed mono8"), table);
+  ASSERT_TRUE(jpeg.problem) << "its values are no ids any more";
+  EXPECT_EQ(jpeg.problem->reason, InputReason::kBadCompression);
+  EXPECT_NE(jpeg.problem->detail.find("send masks as PNG"), std::string::npos);
+  const auto mask = label_image(raw({1, 2, 3, 1, 2, 3, 4, 5, 6}, 3, 1, 9, "rgb8"), table);
+  ASSERT_TRUE(mask.value);
+  EXPECT_EQ(mask.value->unknown_pixels, 3u);
+  EXPECT_EQ(mask.value->unknown, (std::vector<std::string>{"1,2,3", "4,5,6"}));
 }
 
 TEST(ResizedTo, TakesThePixelBelowTheCentre) {
@@ -252,6 +281,25 @@ TEST(CameraModelOf, RegionAndBinningAreThoseOfImageGeometry) {
   info.binning_x = info.binning_y = 1000;
   ASSERT_TRUE(camera_model(info).problem);
   EXPECT_EQ(camera_model(info).problem->reason, InputReason::kBadImageSize);
+}
+
+// As image_geometry: of a rectified image P says what it is projected by.
+TEST(CameraModelOf, OfALensThatDistortsTheProjectionCounts) {
+  CameraInfoFields info;
+  info.width = 640;
+  info.height = 480;
+  info.k = {500, 0, 320, 0, 510, 240, 0, 0, 1};
+  info.p = {400, 0, 310, 0, 0, 410, 230, 0, 0, 0, 1, 0};
+  const CameraModel lens{640, 480, 500, 510, 320, 240}, rectified{640, 480, 400, 410, 310, 230};
+  EXPECT_EQ(*camera_model(info).value, lens) << "nothing was rectified";
+  info.distorted = true;
+  EXPECT_EQ(*camera_model(info).value, rectified);
+  info.p[0] = std::nan("");
+  EXPECT_EQ(*camera_model(info).value, lens);
+  info.p[0] = 400;
+  info.k = {};
+  ASSERT_TRUE(camera_model(info).problem);
+  EXPECT_EQ(camera_model(info).problem->reason, InputReason::kZeroFocalLength);
 }
 
 }  // namespace

@@ -155,6 +155,19 @@ TEST_F(RobotStreamsTest, IdsThatAreNoClassAreNamedWithTheirShare) {
   EXPECT_NE(said.find("50 %"), std::string::npos) << said;
 }
 
+TEST_F(RobotStreamsTest, MasksOfAnotherFrameAreNamedAndUsed) {
+  const cv::Mat ids(6, 8, CV_8UC1, cv::Scalar(7));
+  run(5, [&](StampNs t) {
+    odometry(t), info(t), depth(t);
+    streams().add_image(Stream::kSegmentation, t, "/other", view(ids, "mono8"));
+  });
+  EXPECT_EQ(with_labels(), 5);
+  EXPECT_EQ(problem(InputReason::kOtherFrame), 5u);
+  EXPECT_NE(detail(InputReason::kOtherFrame)
+                .find("header.frame_id is \"other\", that of the depth images \"camera\""),
+            std::string::npos);
+}
+
 TEST_F(RobotStreamsTest, MasksOfAnotherSizeAreResizedAndOfAnotherShapeRefused) {
   run(5, [&](StampNs t) { odometry(t), info(t), depth(t), mask(t, 7, 16, 12); });
   EXPECT_EQ(with_labels(), 5);

@@ -138,7 +138,10 @@ TEST(SuggestInput, TheYamlLoadsAndIsForTheSameTopics) {
 }
 
 TEST(SuggestInput, TheTextListsImageTopicsAndWhatToWrite) {
-  EXPECT_EQ(suggestion_text({{"rt/odom", kOdometry}}), "there is no image topic at all");
+  EXPECT_EQ(suggestion_text({}), "there is no topic at all");
+  EXPECT_EQ(suggestion_text({{"rt/odom", kOdometry}, {"rt/depth", "foxglove.RawImage"}}),
+            "there is no image topic; topics are: rt/odom (nav_msgs/msg/Odometry), rt/depth "
+            "(foxglove.RawImage)");
   const std::string text = suggestion_text(cameras()[0].topics);
   EXPECT_NE(text.find("rt/camera/camera/infra1/image_rect_raw"), std::string::npos) << text;
   EXPECT_NE(
@@ -149,7 +152,82 @@ TEST(SuggestInput, TheTextListsImageTopicsAndWhatToWrite) {
       << text;
 }
 
+/// The part of a suggestion that is to be pasted.
+std::string options_in(const std::vector<TopicInfo>& topics) {
+  const std::string text = suggestion_text(topics);
+  const std::size_t at = text.find("; try ");
+  return at == std::string::npos ? text : text.substr(at + 6);
+}
+
+std::vector<TopicInfo> robot_at(const std::string& place) {
+  return {{place + "/depth/image_raw", kImage},
+          {place + "/depth/camera_info", kInfo},
+          {place + "/segmentation", kImage},
+          {place + "/odom", kOdometry}};
+}
+std::vector<TopicInfo> both(std::vector<TopicInfo> one, const std::vector<TopicInfo>& other) {
+  one.insert(one.end(), other.begin(), other.end());
+  return one;
+}
+
+// What is pasted is enough: all streams of all robots.
+TEST(SuggestInput, TheOptionsAreForAllStreamsAndRobots) {
+  EXPECT_EQ(options_in(both(robot_at("rt/fleet/r1"), robot_at("rt/fleet/r2"))),
+            "--set 'node.topics.depth=rt/fleet/{robot}/depth/image_raw' "
+            "--set 'node.topics.camera_info=rt/fleet/{robot}/depth/camera_info' "
+            "--set 'node.topics.segmentation=rt/fleet/{robot}/segmentation' "
+            "--set 'node.topics.odometry=rt/fleet/{robot}/odom'");
+  // Without a part that could be the robot, it is named.
+  EXPECT_EQ(options_in(robot_at("rt")),
+            "--robot robot --set 'node.topics.depth=rt/depth/image_raw' "
+            "--set 'node.topics.camera_info=rt/depth/camera_info' "
+            "--set 'node.topics.segmentation=rt/segmentation' "
+            "--set 'node.topics.odometry=rt/odom'");
+  // YAML would take text that begins with a brace for a group of keys.
+  EXPECT_EQ(options_in({{"a/depth", kImage}}), "--set 'node.topics.depth=\"{robot}/depth\"'");
+  // Robots whose names have no pattern in common.
+  EXPECT_NE(options_in(both(robot_at("rt/r1"), {{"rt/cam/depth", kImage}, {"rt/cam/i", kInfo}}))
+                .find("pocd_info --suggest FILE"),
+            std::string::npos);
+  // Depth can be a PNG on /compressed.
+  EXPECT_EQ(options_in({{"rt/a/depth/image_raw/compressed", kCompressed}})
+                .find("--set 'node.topics.depth=rt/{robot}/depth/image_raw/compressed'"),
+            0u);
+}
+
+TEST(SuggestInput, WhatAStreamHasInsteadIsListedWithTheOption) {
+  const std::vector<TopicInfo> topics{{"rt/a/depth/image_raw", kImage},
+                                      {"rt/a/segmentation/compressed", kCompressed},
+                                      {"rt/a/color/image_raw/compressed", kCompressed},
+                                      {"rt/info", kInfo},
+                                      {"rt/a/tf", kTf},
+                                      {"rt/a/tf_static", kTf}};
+  RobotConfig robot;
+  robot.name = "a";
+  InputConfig input;
+  const auto instead = [&](InputStream stream) { return instead_of(stream, robot, input, topics); };
+  EXPECT_EQ(instead(InputStream::kSegmentation),
+            "there is rt/a/segmentation/compressed; try --set "
+            "'node.topics.segmentation=rt/{robot}/segmentation/compressed'");
+  EXPECT_EQ(instead(InputStream::kCameraInfo),
+            "there is rt/info; try --robot a --set 'node.topics.camera_info=rt/info'");
+  EXPECT_EQ(instead(InputStream::kOdometry),
+            "there is rt/a/tf (tf2_msgs/msg/TFMessage), rt/a/tf_static (tf2_msgs/msg/TFMessage); "
+            "try --set 'node.topics.tf=rt/{robot}/tf' --set "
+            "'node.topics.tf_static=rt/{robot}/tf_static'");
+  input.robots = {robot};
+  EXPECT_EQ(instead(InputStream::kCameraInfo),
+            "there is rt/info; try --set 'node.topics.camera_info=rt/info'");
+  robot.name = "b";
+  EXPECT_EQ(instead(InputStream::kSegmentation), "") << "that of a named robot is not another's";
+  robot.name = "a";
+  input.topics.camera_info = "rt/info";
+  EXPECT_EQ(instead(InputStream::kCameraInfo), "") << "it is what is looked at";
+}
+
 TEST(SuggestInput, ReadsNamesOfTypesAsTheyAreOnTheBus) {
+  EXPECT_EQ(ros_type_name("sensor_msgs/Image"), kImage);
+  EXPECT_EQ(ros_type_name("sensor_msgs/msg/Image"), kImage);
   EXPECT_EQ(ros_type_name("sensor_msgs::msg::dds_::CompressedImage_"), kCompressed);
   EXPECT_EQ(ros_type_name("HelloWorld"), "HelloWorld");
 }

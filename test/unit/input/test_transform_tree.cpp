@@ -64,12 +64,20 @@ TEST(TransformTree, FailuresNameTheFrames) {
   EXPECT_EQ(said(1'000'000'000).reason, InputReason::kNoTransform);
   EXPECT_EQ(said(1'000'000'000).detail,
             "no transform leads from \"camera\" to \"map\": nobody says where \"odom\" is "
-            "(camera <- base <- odom)");
+            "(camera <- base <- odom); is it the frame of the map? (--set node.map_frame=odom)");
   EXPECT_EQ(said(1'500'000'000).reason, InputReason::kNoPose);
   EXPECT_EQ(said(1'500'000'000).detail,
-            "odom -> base: newest pose is of 1.000 s, the image of 1.500 s");
+            "odom -> base: newest pose is of 1.000 s, the image of 1.500 s; it came once: a "
+            "transform that does not change belongs on tf_static");
   EXPECT_EQ(said(900'000'000).detail,
             "odom -> base: oldest pose is of 1.000 s, the image of 0.900 s");
+  tree.add("odom", "base", 2'000'000'000, {});
+  EXPECT_EQ(said(1'500'000'000).detail,
+            "odom -> base: no pose is between 1.000 s and 2.000 s, the image is of 1.500 s "
+            "(--set node.max_pose_gap_s=1.0 interpolates over so long)");
+  EXPECT_EQ(said(2'450'000'000).detail,
+            "odom -> base: newest pose is of 2.000 s, the image of 2.450 s; "
+            "--set node.extrapolation_s=0.5 holds that pose");
   tree.set_static("camera", "odom", {});
   EXPECT_EQ(said(1'000'000'000).reason, InputReason::kTransformLoop);
   EXPECT_EQ(said(1'000'000'000)
@@ -77,6 +85,27 @@ TEST(TransformTree, FailuresNameTheFrames) {
                              "camera <- base <- odom <- camera"),
             0u)
       << said(1'000'000'000).detail;
+}
+
+// As tf2: an odometry that is sent inverted makes the map a child of the robot.
+TEST(TransformTree, TheMapNeedNotBeAnAncestorOfTheCamera) {
+  TransformTree tree(1'000'000'000);
+  tree.set_static("base", "camera", shifted(1));
+  tree.add("base", "map", 0, shifted(-5));
+  tree.add("base", "map", 1'000'000'000, shifted(-7));
+  EXPECT_EQ(x_of(tree.lookup("map", "camera", 500'000'000, 0)), 7.0);
+  TransformTree star(100);
+  star.add("earth", "map", 0, shifted(10));
+  star.add("earth", "base", 0, shifted(12));
+  star.set_static("base", "camera", shifted(1));
+  EXPECT_EQ(x_of(star.lookup("map", "camera", 0, 0)), 3.0);
+  // What fails on the way down from the common frame is named, too.
+  const TransformLookup late = tree.lookup("map", "camera", 3'000'000'000, 0);
+  EXPECT_EQ(late.result, PoseLookup::kTooNew);
+  EXPECT_EQ(tree.explain("map", "camera", 3'000'000'000, late).detail,
+            "base -> map: newest pose is of 1.000 s, the image of 3.000 s");
+  star.set_static("mars", "rover", {});
+  EXPECT_EQ(star.lookup("rover", "camera", 0, 0).result, PoseLookup::kEmpty);
 }
 
 TEST(TransformTree, ARenamedParentIsSaid) {

@@ -36,6 +36,7 @@ enum class InputReason {
   kUnlistedClass,
   kNoMask,
   kNoUsableDepth,
+  kOtherFrame,
 };
 const char* to_string(InputReason reason);  ///< "unknown_encoding", ...
 
@@ -54,6 +55,7 @@ inline bool used_anyway(const InputProblem& problem) {
     case InputReason::kUnlistedClass:
     case InputReason::kNoMask:
     case InputReason::kNoUsableDepth:
+    case InputReason::kOtherFrame:
       return true;
     default:
       return false;

@@ -50,6 +50,7 @@ class LabelTable {
   /// not be listed; with an empty list, every class is known.
   bool known(std::uint16_t pixel) const { return known_.empty() || known_[pixel]; }
   int class_of(std::uint16_t pixel) const { return pixel / divisor_; }
+  bool has_colours() const { return !values_.empty(); }
 
  private:
   std::map<std::uint32_t, int> values_;
@@ -58,29 +59,37 @@ class LabelTable {
 };
 
 struct LabelImage {
-  cv::Mat labels;                    ///< CV_16UC1
-  std::uint64_t unknown_pixels = 0;  ///< colours of no class: they became class 0
+  cv::Mat labels;  ///< CV_16UC1
+  /// Colours of no class: they became class 0. Pixels, and up to 5 of the colours ("r,g,b").
+  std::uint64_t unknown_pixels = 0;
+  std::vector<std::string> unknown;
   /// Values of no listed class (they are kept): pixels, and up to 5 of the classes.
   std::uint64_t unlisted_pixels = 0;
-  std::vector<int> unlisted;
+  std::vector<std::int64_t> unlisted;
 };
 /// mono8, 8UC1, mono16, 16UC1, 32SC1, PNG: class indices. rgb8, bgr8, rgba8, bgra8, PNG, JPEG: by
-/// colour (of a JPEG the nearest one). A copy.
+/// colour (of a JPEG the nearest one; a grey JPEG is refused: its values are no ids any more). A
+/// copy.
 Checked<LabelImage> label_image(const ImageView& image, const LabelTable& labels);
 
 /// An image in another size, nearest pixels; nothing when the sides' ratio differs by more than
 /// 1 %.
 std::optional<cv::Mat> resized_to(const cv::Mat& image, int width, int height);
 
-/// Fields of sensor_msgs/CameraInfo; `k` is the row-major intrinsic matrix of the full image.
+/// Fields of sensor_msgs/CameraInfo, of the full image, row-major: `k` as the lens makes it, `p` of
+/// the rectified image (all 0: not given); `distorted`: `d` has a coefficient that is not 0.
 struct CameraInfoFields {
   std::uint32_t width = 0, height = 0;
   std::array<double, 9> k{};
+  std::array<double, 12> p{};
+  bool distorted = false;
   std::uint32_t binning_x = 0, binning_y = 0;  ///< 0 is 1
   std::uint32_t roi_x = 0, roi_y = 0;
   std::uint32_t roi_width = 0, roi_height = 0;  ///< 0: all
 };
 /// The camera of the image that is sent: the region of interest, binned (as image_geometry does).
+/// Depth images are rectified: of a lens that distorts, `p` says what they are projected by, where
+/// it is given; without distortion `k` says the same, and counts.
 Checked<CameraModel> camera_model(const CameraInfoFields& info);
 
 /// Names are there (a leading slash is left out, as tf2 does), values finite, the quaternion a unit

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <utility>
 
 #include "pocd/common/types.hpp"
 #include "pocd/input/pose_quaternion.hpp"
@@ -30,7 +31,11 @@ class PoseBuffer {
   /// Up to `extrapolation_ns` after the newest pose, that newest pose is held.
   PoseLookup at(StampNs stamp_ns, StampNs extrapolation_ns, PoseQuaternion& pose) const;
 
+  /// Of kGap: the stamps of the poses on both sides.
+  std::pair<StampNs, StampNs> around(StampNs stamp_ns) const;
+
   bool empty() const { return entries_.empty(); }
+  std::size_t size() const { return entries_.size(); }
   StampNs oldest_ns() const { return entries_.front().stamp_ns; }
   StampNs newest_ns() const { return entries_.back().stamp_ns; }
 

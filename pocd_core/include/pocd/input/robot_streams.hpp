@@ -39,6 +39,7 @@ class RobotStreams {
   RobotStreams& operator=(const RobotStreams&) = delete;
 
   const std::string& name() const { return robot_.name; }
+  const RobotConfig& config() const { return robot_; }
   /// Its topics on the bus.
   std::string topic(InputStream stream) const { return topic_of(context_.input, robot_, stream); }
   std::string topic(Stream stream) const;
@@ -73,6 +74,7 @@ class RobotStreams {
   bool due(StampNs stamp_ns);
   std::optional<cv::Mat> converted(Stream stream, const ImageView& image);
   bool accept_camera_frame(const std::string& frame);
+  void compare_frame(Stream stream, const std::string& frame);
   std::optional<Frame> frame_of(const SyncedFrame& synced);
   bool fit(cv::Mat& image, const SyncedFrame& synced, Stream stream);
   void look_for_depth(const Frame& frame);
@@ -83,6 +85,7 @@ class RobotStreams {
   TransformTree own_transforms_, transforms_;
   TimeSynchronizer synchronizer_;
   std::string camera_frame_;           ///< "" until the first depth image
+  std::string depth_frame_;            ///< as the depth images name it
   std::optional<CameraModel> camera_;  ///< as its source said last
   std::optional<StampNs> due_ns_;
   int frames_without_depth_ = 0;  ///< as long as none has had a pixel in range

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pocd/input/input_config.hpp"
+#include "pocd/input/input_topics.hpp"
 
 namespace pocd {
 
@@ -13,8 +14,9 @@ struct TopicInfo {
   std::string topic, type;
 };
 
-/// "nav_msgs::msg::dds_::Odometry_" -> "nav_msgs/msg/Odometry"; other names stay.
-std::string ros_type_name(const std::string& dds_type);
+/// "nav_msgs::msg::dds_::Odometry_", "nav_msgs/Odometry" -> "nav_msgs/msg/Odometry"; other names
+/// stay.
+std::string ros_type_name(const std::string& type);
 
 /// Cameras whose depth images are among the topics, each with the topics that go with it: those of
 /// the same camera, robot, or that are the only ones. Cameras are told by the names that drivers
@@ -25,8 +27,14 @@ std::vector<RobotConfig> suggest_robots(const std::vector<TopicInfo>& topics);
 /// The group `node` with these robots, as YAML; "" without robots.
 std::string suggestion_yaml(const std::vector<RobotConfig>& robots);
 
-/// For a message that no depth image was found: which image topics there are, and what to write
-/// into the command line.
+/// For a message that no depth image was found: which image topics there are (else which topics),
+/// and what to write into the command line.
 std::string suggestion_text(const std::vector<TopicInfo>& topics);
+
+/// For a message that a robot's stream (camera info, masks, or poses) is on no topic: which topics
+/// of its kind there are under other names, and what to write into the command line; "" when there
+/// is none.
+std::string instead_of(InputStream stream, const RobotConfig& robot, const InputConfig& input,
+                       const std::vector<TopicInfo>& topics);
 
 }  // namespace pocd

@@ -25,6 +25,7 @@ struct TransformLookup {
   PoseLookup result = PoseLookup::kEmpty;
   Pose T_target_source = Pose::Identity();
   std::string edge;
+  std::string child;   ///< of that transform
   StampNs off_ns = 0;  ///< of kTooNew and kTooOld: how far the stamp lies beyond the poses
 };
 
@@ -53,8 +54,9 @@ class TransformTree {
   /// The frames from `source` up to the one before `target`, as far as they are known.
   std::vector<std::string> chain(const std::string& target, const std::string& source) const;
 
-  /// T_target_source at the stamp; `target` must be an ancestor of `source` (or the same frame).
-  /// kEmpty: no chain of parents leads from source to target; `edge` names the frame where it ends.
+  /// T_target_source at the stamp. As with tf2, `target` need not be an ancestor of `source`: they
+  /// may have one in common (an odometry that is sent inverted makes the map a child of the robot).
+  /// kEmpty: they have none; `edge` names the frame where the chain of parents of `source` ends.
   /// kLoop: the parents go round.
   TransformLookup lookup(const std::string& target, const std::string& source, StampNs stamp_ns,
                          StampNs extrapolation_ns) const;
@@ -63,6 +65,9 @@ class TransformTree {
                        const TransformLookup& failure) const;
 
  private:
+  /// lookup() where `target` is an ancestor.
+  TransformLookup climb(const std::string& target, const std::string& source, StampNs stamp_ns,
+                        StampNs extrapolation_ns) const;
   struct Edge {
     std::string parent;
     bool is_static = false;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -79,9 +80,10 @@ class RecordingReader {
     }
     return decided_[channel];
   }
-  void add_problem(const std::string& problem) {
+  /// `told`: it has a line of its own.
+  void add_problem(const std::string& problem, bool told = true) {
     ++problem_count_;
-    if (problems_.size() < kMostProblems) problems_.push_back(problem);
+    if (told && problems_.size() < kMostProblems) problems_.push_back(problem);
   }
 
   /// rosbag2 can compress messages one by one (no CDR begins like zstd): the message becomes what
@@ -92,6 +94,7 @@ class RecordingReader {
   static constexpr std::size_t kLargestMessage = 256u << 20;
 
   Bytes unpacked_;
+  std::set<std::size_t> left_out_;  // channels of messages that cannot be unpacked
   std::function<bool(const RecordedChannel&)> wanted_;
   std::vector<bool> decided_;  // by channel
   std::vector<std::string> problems_;
