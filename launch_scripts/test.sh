@@ -39,11 +39,14 @@ done
 [[ -n "$sanitizer" && -n "$and_sanitized" ]] && usage
 
 rules=$PWD/test/support/sanitizers
+# Reports are files: many are made by processes that a test started, whose stderr and exit code it may not look at.
+reports=$PWD/build/sanitizer_reports
+common="exitcode=66 log_path=$reports/report"
 # A report ends the process with an exit code that no test takes for success.
-export TSAN_OPTIONS="suppressions=$rules/thread.supp exitcode=66 second_deadlock_stack=1"
+export TSAN_OPTIONS="suppressions=$rules/thread.supp $common second_deadlock_stack=1"
 # Fast DDS 2.9.1 deletes parts of each writer as their base class: nothing on a bus would end without a report.
-export ASAN_OPTIONS="exitcode=66 detect_stack_use_after_return=1 new_delete_type_mismatch=0"
-export UBSAN_OPTIONS="print_stacktrace=1"
+export ASAN_OPTIONS="$common detect_stack_use_after_return=1 new_delete_type_mismatch=0"
+export UBSAN_OPTIONS="print_stacktrace=1 log_path=$reports/report"
 export LSAN_OPTIONS="suppressions=$rules/leak.supp print_suppressions=0"
 
 passed=0 failed=0 skipped=0 status=0
@@ -102,12 +105,18 @@ run_tests() {
   launch_scripts/build.sh "${build_arguments[@]}" -- "${cmake_arguments[@]}"
 
   local results=$build/pocd_test
-  rm -rf "$results/gtest" "$results/Testing"
+  rm -rf "$results/gtest" "$results/Testing" "$reports"
+  mkdir -p "$reports"
   colcon --log-level error test --base-paths test --merge-install "${base[@]}" --packages-select pocd_test \
     --event-handlers console_direct+ --return-code-on-test-failure \
     --ctest-args --output-on-failure "${ctest_arguments[@]}" || status=$?
   before=$((passed + failed))
   count_all "$results"
+  if [[ -n "$(ls "$reports")" ]]; then
+    head --lines 200 "$reports"/* >&2
+    echo "test.sh: $(ls "$reports" | wc -l) processes with reports of a sanitizer" >&2
+    status=1
+  fi
   if ((passed + failed == before)); then
     echo "test.sh: no test ran" >&2
     status=1
