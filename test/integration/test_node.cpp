@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <sstream>
 
 #include "robot_sender.hpp"
@@ -11,6 +12,7 @@ namespace pocd {
 namespace {
 
 TEST(Node, EndsInOrderOnEverySignal) {
+  std::signal(SIGHUP, SIG_DFL);  // below nohup it is ignored, by the node as well
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     const TestDomain domain;
     HealthWatch health(test_participant(domain));
