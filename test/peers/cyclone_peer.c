@@ -432,5 +432,7 @@ int main(int argc, char** argv) {
           (long long)all.last.tile_count, (long long)all.objects_alive.count,
           (long long)all.last.object_count);
   dds_delete(bus);
+  free(all.objects_alive.handles);
+  free(all.tiles_alive.handles);
   return fclose(log_file) == 0 ? 0 : 1;
 }
