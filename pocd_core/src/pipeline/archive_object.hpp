@@ -126,10 +126,11 @@ void archive(Archive& a, LibraryObject& object) {
 template <class Archive>
 void archive(Archive& a, Departure& departure) {
   auto& [id, part_of, class_id, box, surfels, first_seen_ns, in_place_ns, first_gone_ns,
-         departed_ns, arrival, seen_by, evidence, asked_far] = departure;
+         departed_ns, arrival, seen_by, evidence, asked_far, is_not] = departure;
   a(id, part_of, class_id, box);
   surfels_by_planes(a, surfels);
   a(first_seen_ns, in_place_ns, first_gone_ns, departed_ns, arrival, seen_by, evidence, asked_far);
+  a(is_not);
 }
 
 template <class Archive>

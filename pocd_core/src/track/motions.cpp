@@ -29,11 +29,6 @@ constexpr double kSeenShare = 0.2;
 /// against the rest.
 constexpr double kSureFit = 0.9;
 constexpr double kShiftRad = M_PI / 4.0;
-/// So far, in its lengths or in shares of the reach, a move is told at once.
-constexpr double kAtOnceShare = 1.0;
-constexpr double kAtOnceReachShare = 1.0 / 3.0;
-/// A longer one is told after this time: another origin may be nearer [s].
-constexpr double kFarWaitS = 1.0;
 /// Motions that agree with this much less of what is known explain it as well; when they put the
 /// thing's middle elsewhere by more than this share of its length, nothing is known of where it is.
 constexpr double kSameFit = 0.03;
@@ -44,16 +39,6 @@ constexpr double kOnVoxels = 1.5;
 constexpr std::size_t kAlignPoints = 600;
 
 }  // namespace
-
-bool ObjectTracker::may_tell(const Motion& motion, const Departure& departure,
-                             const LibraryObject& found, StampNs now_ns) const {
-  // What came from farther away is told once nearer origins had time to show.
-  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
-  const double moved_m = motion.lengths * longest_side(departure.box);
-  return motion.lengths <= kAtOnceShare ||
-         moved_m <= kAtOnceReachShare * config_.state.relocation_reach_m ||
-         (now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns);
-}
 
 std::optional<Motion> ObjectTracker::explanation(const Step& step, const Departure& departure,
                                                  const LibraryObject& found,
@@ -117,6 +102,7 @@ std::optional<Motion> ObjectTracker::explanation(const Step& step, const Departu
 std::vector<Motion> ObjectTracker::motions_of(const Step& step, const Departure& departure,
                                               const LibraryObject& found, Asked asked) const {
   if (departure.class_id != found.class_id || departure.id == found.id) return {};
+  if (found.id != ObjectId::kNone && departure.is_not == found.id) return {};
   // What was seen in its place when the new one was there, too, is another thing.
   if (departure.in_place_ns > found.first_seen_ns) return {};
   const double slack_m = 3.0 * config_.map.voxel_size_m;

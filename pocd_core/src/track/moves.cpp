@@ -7,10 +7,23 @@
 namespace pocd {
 namespace {
 
-/// A move over a distance is told after this time: another origin may be nearer [s].
+/// So far, in its lengths or in shares of the reach, a move is told at once.
+constexpr double kAtOnceShare = 1.0;
+constexpr double kAtOnceReachShare = 1.0 / 3.0;
+/// A longer one is told after this time: another origin may be nearer [s].
 constexpr double kFarWaitS = 1.0;
 
 }  // namespace
+
+bool ObjectTracker::may_tell(const Motion& motion, const Departure& departure,
+                             const LibraryObject& found, StampNs now_ns) const {
+  // What came from farther away is told once nearer origins had time to show.
+  const auto wait_ns = static_cast<StampNs>(kFarWaitS * 1e9);
+  const double moved_m = motion.lengths * longest_side(departure.box);
+  return motion.lengths <= kAtOnceShare ||
+         moved_m <= kAtOnceReachShare * config_.state.relocation_reach_m ||
+         (now_ns - departure.departed_ns >= wait_ns && now_ns - found.first_seen_ns >= wait_ns);
+}
 
 bool ObjectTracker::origin_in_doubt(const LibraryObject& object) {
   for (const ObjectId id :
@@ -160,6 +173,43 @@ std::vector<Surfel> ObjectTracker::other_sides(const Step& step, const Departure
                      [&](const Surfel& s) { return seen_empty(step.distance_at, s.point_W); }),
       sides.end());
   return sides;
+}
+
+void ObjectTracker::move_displaced(Step& step, Look& look) {
+  LibraryObject& object = *look.object;
+  const OrientedBox previous_box = object.box;
+  Move move;
+  move.id = object.id;
+  move.class_id = object.class_id;
+  move.from = previous_box;
+  move.T_new_old = look.T_new_old;
+  move.in_place_ns = object.in_place_ns;
+  move.moved_ns = step.frame.stamp_ns;
+  object.looks_displaced = 0;
+  object.model.transform(look.T_new_old);
+  for (Surfel& s : object.model.surfels()) s.seen_through = 0;
+  look.sighting.sights.clear();  // of points that are elsewhere now
+  object.icp_target.reset();
+  step.edits.clear(object.id);
+  refit_box(step, object);
+  measure(step, look, look.sign * look.displacement_m);
+  // Change is measured from the new place on.
+  const auto evidence = step.evidence.find(object.id);
+  if (evidence != step.evidence.end()) evidence->second.after.mu = 0.0;
+  object.belief.mu = 0.0;
+  object.moment = {};
+  object.in_place_ns = step.frame.stamp_ns;
+  object.added_ns.reset();
+  object.arrival = Arrival::kArrived;
+  object.moved = true;
+  object.placed_ns = step.frame.stamp_ns;
+  ObjectEvent& event = add_event(step, EventKind::kMoved, object, Rule::kAlignedElsewhere);
+  event.previous_box = previous_box;
+  event.last_there_ns = move.in_place_ns;
+  object.reported_box = object.box;
+  object.lost = 0;
+  step.moves.push_back(move);
+  keep(move, step.result);
 }
 
 void ObjectTracker::report_move(Step& step, LibraryObject& found, const Departure& from,

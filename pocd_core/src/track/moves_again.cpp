@@ -66,9 +66,10 @@ void ObjectTracker::correct(Step& step, LibraryObject& object, const ObjectModel
 }
 
 void ObjectTracker::take_back(Step& step, LibraryObject& object, const LibraryObject& there) {
-  const Departure left = *departures_.last_move_of(object.id)->left;
+  Departure left = *departures_.last_move_of(object.id)->left;
   departures_.forget_moves_of(object.id);
   const ObjectId id = library_.reserve_id();
+  left.is_not = id;
   step.edits.reassign(object.id, id);
   std::replace(step.owners.begin(), step.owners.end(), object.id, id);
   library_.rename(object.id, id);
@@ -82,6 +83,8 @@ void ObjectTracker::take_back(Step& step, LibraryObject& object, const LibraryOb
   object.changed = false;  // it was listed under its old id
   refit_box(step, object);
   report_gone(step, left, Rule::kAnotherThing);
+  // A part that moved was an object of its own.
+  if (left.part_of != ObjectId::kNone) step.result.retired.push_back(left.id);
   confirm(step, object);
 }
 

@@ -147,43 +147,6 @@ bool ObjectTracker::lasts(const Step& step, StampNs since_ns) const {
   return step.frame.stamp_ns - since_ns >= static_cast<StampNs>(config_.state.moment_s * 1e9);
 }
 
-void ObjectTracker::move_displaced(Step& step, Look& look) {
-  LibraryObject& object = *look.object;
-  const OrientedBox previous_box = object.box;
-  Move move;
-  move.id = object.id;
-  move.class_id = object.class_id;
-  move.from = previous_box;
-  move.T_new_old = look.T_new_old;
-  move.in_place_ns = object.in_place_ns;
-  move.moved_ns = step.frame.stamp_ns;
-  object.looks_displaced = 0;
-  object.model.transform(look.T_new_old);
-  for (Surfel& s : object.model.surfels()) s.seen_through = 0;
-  look.sighting.sights.clear();  // of points that are elsewhere now
-  object.icp_target.reset();
-  step.edits.clear(object.id);
-  refit_box(step, object);
-  measure(step, look, look.sign * look.displacement_m);
-  // Change is measured from the new place on.
-  const auto evidence = step.evidence.find(object.id);
-  if (evidence != step.evidence.end()) evidence->second.after.mu = 0.0;
-  object.belief.mu = 0.0;
-  object.moment = {};
-  object.in_place_ns = step.frame.stamp_ns;
-  object.added_ns.reset();
-  object.arrival = Arrival::kArrived;
-  object.moved = true;
-  object.placed_ns = step.frame.stamp_ns;
-  ObjectEvent& event = add_event(step, EventKind::kMoved, object, Rule::kAlignedElsewhere);
-  event.previous_box = previous_box;
-  event.last_there_ns = move.in_place_ns;
-  object.reported_box = object.box;
-  object.lost = 0;
-  step.moves.push_back(move);
-  keep(move, step.result);
-}
-
 Moment& ObjectTracker::moment_of(Step& step, LibraryObject& object) {
   const std::string& robot = step.frame.robot;
   const StampNs stamp_ns = step.frame.stamp_ns;

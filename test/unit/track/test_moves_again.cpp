@@ -62,6 +62,21 @@ TEST_F(MovesAgain, WhatTurnsOutToBeAnotherThingIsTakenBack) {
   ASSERT_EQ(rig_.of_class(kBoxClass).size(), 1u) << rig_.told();
   EXPECT_EQ(rig_.of_class(kBoxClass)[0]->id, added.object);
   EXPECT_NE(added.object, known());
+  EXPECT_EQ(rig_.published(), rig_.confirmed());
+}
+
+// A part of a wide one leaves, and is told to be what is half hidden at first.
+TEST_F(MovesAgain, APartThatIsTakenBackIsRetiredAndNotToldAgain) {
+  know({solid(kBoxClass, {-0.75, 2.3}, {1.3, 0.3, 0.8})});
+  const SceneObject rest = solid(kBoxClass, {-1.22, 2.3}, {0.35, 0.3, 0.8});
+  const SceneObject narrow = solid(kBoxClass, {0.6, 2.3}, {0.5, 0.3, 0.8});
+  find({rest, narrow, solid(kPersonClass, {0.15, 1.6}, {0.36, 0.05, 1.8})}, 30);
+  ASSERT_EQ(of_kind(EventKind::kMoved).size(), 1u) << rig_.told();
+  ASSERT_NE(of_kind(EventKind::kMoved)[0]->object, known());
+  EXPECT_EQ(rig_.published(), rig_.confirmed()) << rig_.told();
+  rig_.look_times(30, room_with({rest, narrow}));
+  ASSERT_EQ(rig_.events.back().kind, EventKind::kAdded) << rig_.told();
+  EXPECT_EQ(rig_.published(), rig_.confirmed()) << rig_.told();
 }
 
 // The known one was wider than what is found, of which nothing more is seen later.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,8 @@ class TrackerRig {
     input.owner_height = s.cloud.height;
     input.owner_stride = s.cloud.stride;
     map_.integrate(input, pool_);
+    for (const ObjectId id : result.retired) published_.erase(id);
+    for (const ObjectSnapshot& o : result.changed_objects) published_.insert(o.id);
     events.insert(events.end(), result.events.begin(), result.events.end());
     return result;
   }
@@ -66,6 +69,15 @@ class TrackerRig {
       if (object->class_id == class_id) list.push_back(object.get());
     }
     return list;
+  }
+  /// What a subscriber holds, and what it has to hold.
+  const std::set<ObjectId>& published() const { return published_; }
+  std::set<ObjectId> confirmed() const {
+    std::set<ObjectId> ids;
+    for (const auto& [id, object] : tracker_.library().all()) {
+      if (object->confirmed) ids.insert(id);
+    }
+    return ids;
   }
   std::size_t count(EventKind kind) const {
     return static_cast<std::size_t>(std::count_if(
@@ -95,6 +107,7 @@ class TrackerRig {
   DepthField field_;
   ThreadPool pool_{1};
   std::vector<std::uint32_t> owners_;
+  std::set<ObjectId> published_;
   double now_s_ = 1.0;
   std::uint64_t count_ = 0;
 };

@@ -24,6 +24,8 @@ struct Departure {
   std::set<std::string> seen_by;
   Evidence evidence;
   bool asked_far = false;  ///< objects at a distance were asked whether they are it
+  ObjectId is_not =
+      ObjectId::kNone;  ///< the last object that was taken for it and is another thing
 };
 
 /// How a thing went from its old place to the new one.
