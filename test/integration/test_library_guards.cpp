@@ -147,17 +147,26 @@ TEST(LibraryGuards, ASlowProgramCostsNoMemoryAndMissesNoLastState) {
   };
   const ObjectWatch watch(options);
   ASSERT_TRUE(eventually([&] { return objects.matched() == 1; }));
-  constexpr std::uint32_t kRounds = 4000;  // more, of three objects, than the watch's reader keeps
-  for (std::uint32_t round = 1; round <= kRounds; ++round) {
+  std::uint32_t rounds = 0;
+  const auto write_round = [&] {
+    ++rounds;
     for (const std::uint32_t id : {1, 2, 3}) {
       ObjectSnapshot object;
       object.id = static_cast<ObjectId>(id);
-      object.observations = round;
+      object.observations = rounds;
       auto state = dds::object_message(object, {0, 1}, ClassMap{}, 1, "map");
-      ASSERT_TRUE(objects.write(state));
+      EXPECT_TRUE(objects.write(state));
     }
-  }
-  ASSERT_TRUE(eventually([&] { return watch.status().callbacks.waiting == 5; }));
+  };
+  const auto full = [&] { return watch.status().callbacks.waiting == 5; };
+  // The writer keeps the last state of each object: written at once, no more may ever arrive. From
+  // here on nothing returns early, as the watch ends only when its callback does.
+  EXPECT_TRUE(eventually([&] {
+    write_round();
+    return full();
+  }));
+  for (int more = 0; more < 4000; ++more) write_round();  // more than the watch's reader keeps
+  EXPECT_TRUE(full());
   {
     const std::lock_guard<std::mutex> lock(mutex);
     open = true;
@@ -165,7 +174,7 @@ TEST(LibraryGuards, ASlowProgramCostsNoMemoryAndMissesNoLastState) {
   changed.notify_all();
   EXPECT_TRUE(eventually([&] {
     const std::lock_guard<std::mutex> lock(mutex);
-    return last == std::map<std::uint32_t, std::uint32_t>{{1, kRounds}, {2, kRounds}, {3, kRounds}};
+    return last == std::map<std::uint32_t, std::uint32_t>{{1, rounds}, {2, rounds}, {3, rounds}};
   })) << calls;
   EXPECT_EQ(watch.status().callbacks.dropped, 0u);
   // Names on the bus are the peers' choice.
