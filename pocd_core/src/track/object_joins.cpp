@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
+#include <tuple>
 #include <utility>
 
 #include "tracker_step.hpp"
@@ -105,6 +107,24 @@ bool ObjectTracker::coincide(const LibraryObject& a, const LibraryObject& b) con
   return static_cast<double>(same) >= kSameShare * static_cast<double>(asked);
 }
 
+bool ObjectTracker::carries(const LibraryObject& low, const LibraryObject& high) const {
+  if (low.class_id == kThing) return false;
+  const auto lowest = [](const LibraryObject& o) {
+    float z = std::numeric_limits<float>::infinity();
+    for (const Surfel& s : o.model.surfels()) z = std::min(z, s.point_W.z());
+    return z;
+  };
+  const float low_z = lowest(low), high_z = lowest(high);
+  const auto contact = static_cast<float>(contact_m());
+  if (high_z - low_z < 2.0f * contact) return false;
+  OrientedBox column = low.box;
+  column.size_m.z() = 100.0;
+  if (inside_share(high.model.surfels(), column, 2.0 * config_.map.voxel_size_m) < kInsideShare) return false;
+  float top = -std::numeric_limits<float>::infinity();
+  for (const Surfel& s : low.model.surfels()) top = std::max(top, s.point_W.z());
+  return high_z - top < contact;
+}
+
 void ObjectTracker::join_objects(Step& step) {
   const int enough = config_.state.merge_frames;
   std::vector<std::pair<ObjectId, ObjectId>> joined;
@@ -156,17 +176,20 @@ void ObjectTracker::join_objects(Step& step) {
     }
   }
   for (const auto& [a, b] : joined) {
-    LibraryObject *survivor = library_.find(a), *absorbed = library_.find(b);
-    if (!survivor || !absorbed) continue;
-    // What is known outside goes on; of two such, the older one.
-    if (absorbed->confirmed && !survivor->confirmed) std::swap(survivor, absorbed);
-    absorb(step, *survivor, *absorbed);
+    LibraryObject *x = library_.find(a), *y = library_.find(b);
+    if (x && y) join(step, *x, *y);
   }
 }
 
 void ObjectTracker::join(Step& step, LibraryObject& a, LibraryObject& b) {
-  const bool older = a.id < b.id;
-  absorb(step, older ? a : b, older ? b : a);
+  // What is known outside goes on; of two such, the one that was reported first: a candidate may be
+  // older than its report. What moved was known before it did.
+  const auto since = [](const LibraryObject& object) {
+    const StampNs reported_ns = object.added_ns.value_or(std::numeric_limits<StampNs>::min());
+    return std::make_tuple(!object.confirmed, reported_ns, object.id);
+  };
+  const bool first = since(a) < since(b);
+  absorb(step, first ? a : b, first ? b : a);
 }
 
 void ObjectTracker::absorb(Step& step, LibraryObject& survivor, LibraryObject& absorbed) {
@@ -232,6 +255,7 @@ LibraryObject* ObjectTracker::whole_of(Step& step, const LibraryObject& found) {
     const bool lately = other->added_ns && step.frame.stamp_ns - *other->added_ns <= window_ns;
     if (arrived && !(other_arrived && lately)) continue;
     if (connected(found, *other) || share >= kInsideShare) return other;
+    if (carries(*other, found) || carries(found, *other)) return other;
     if (surroundings_known(found, *other) && sides_of_one(step, found, *other)) return other;
   }
   return nullptr;

@@ -111,6 +111,7 @@ class ObjectTracker {
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
   /// Whether two objects may be sides of one body: nothing was ever seen through between them, and
   /// they are no farther apart than the larger one is long.
+  bool carries(const LibraryObject& low, const LibraryObject& high) const;
   bool sides_of_one(Step& step, const LibraryObject& a, const LibraryObject& b) const;
   /// Whether `known` stood in its place for long enough before `found` was first seen that the free
   /// space around it is known.
