@@ -109,20 +109,14 @@ bool ObjectTracker::coincide(const LibraryObject& a, const LibraryObject& b) con
 
 bool ObjectTracker::carries(const LibraryObject& low, const LibraryObject& high) const {
   if (low.class_id == kThing) return false;
-  const auto lowest = [](const LibraryObject& o) {
-    float z = std::numeric_limits<float>::infinity();
-    for (const Surfel& s : o.model.surfels()) z = std::min(z, s.point_W.z());
-    return z;
-  };
-  const float low_z = lowest(low), high_z = lowest(high);
-  const auto contact = static_cast<float>(contact_m());
-  if (high_z - low_z < 2.0f * contact) return false;
+  const double bottom_m = high.box.pose.position_W.z() - 0.5 * high.box.size_m.z();
+  const double middle_m = low.box.pose.position_W.z();
+  const double top_m = middle_m + 0.5 * low.box.size_m.z();
+  if (bottom_m < middle_m || bottom_m > top_m + contact_m()) return false;
   OrientedBox column = low.box;
-  column.size_m.z() = 100.0;
-  if (inside_share(high.model.surfels(), column, 2.0 * config_.map.voxel_size_m) < kInsideShare) return false;
-  float top = -std::numeric_limits<float>::infinity();
-  for (const Surfel& s : low.model.surfels()) top = std::max(top, s.point_W.z());
-  return high_z - top < contact;
+  column.size_m.z() = std::numeric_limits<double>::infinity();
+  const double margin_m = 2.0 * config_.map.voxel_size_m;
+  return inside_share(high.model.surfels(), column, margin_m) >= kInsideShare;
 }
 
 void ObjectTracker::join_objects(Step& step) {

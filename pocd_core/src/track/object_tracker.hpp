@@ -109,9 +109,12 @@ class ObjectTracker {
   void forget_gone_companions(LibraryObject& object);
   /// Whether two objects of one piece in the image are one piece of surface in the map.
   bool connected(const LibraryObject& a, const LibraryObject& b) const;
-  /// Whether two objects may be sides of one body: nothing was ever seen through between them, and
-  /// they are no farther apart than the larger one is long.
+  /// Whether `high` stands within the outline of `low`, from above its middle on and not clear of
+  /// its top: of one class they are one thing, as a stack or a cart and its handle. Without a class
+  /// they may be two.
   bool carries(const LibraryObject& low, const LibraryObject& high) const;
+  /// Whether two objects may be sides of one body, or a fragment and its body: nothing was ever
+  /// seen through between them, and they are no farther apart than the larger one is long.
   bool sides_of_one(Step& step, const LibraryObject& a, const LibraryObject& b) const;
   /// Whether `known` stood in its place for long enough before `found` was first seen that the free
   /// space around it is known.

@@ -23,6 +23,10 @@ constexpr float kOutside = 0.4f;
 /// Two sides of a body face away from each other along the line between them, by this difference of
 /// cosines at least: surfaces that face one way are of two things in a row.
 constexpr float kApart = 0.2f;
+/// A piece of at most this share of the other one's surface, so many contacts away or nearer, may
+/// lie in any direction from it: a fork or a handle is no side that faces away.
+constexpr double kFragmentShare = 0.3;
+constexpr double kFragmentContacts = 3.0;
 
 bool told_apart(const LibraryObject& a, const LibraryObject& b) {
   const auto apart = [](const LibraryObject& x, const LibraryObject& y) {
@@ -84,14 +88,19 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const Libra
             [](const Line& l, const Line& r) { return l.length_m < r.length_m; });
   lines.resize((lines.size() + 1) / 2);
   if (lines.front().length_m > reach_m) return false;
+  const auto less = static_cast<double>((a_less ? a : b).model.surfels().size());
+  const auto more = static_cast<double>((a_less ? b : a).model.surfels().size());
+  const bool fragment = a.class_id != kThing && less <= kFragmentShare * more &&
+                        lines.front().length_m < kFragmentContacts * contact_m();
   const auto cell_m = static_cast<float>(2.0 * config_.map.voxel_size_m);
   std::size_t crossing = 0;
   for (const Line& line : lines) {
     const Eigen::Vector3f along =
         (line.to->point_W - line.from->point_W) / std::max(line.length_m, 1e-6f);
     const float leaves = line.from->normal_W.dot(along), enters = -line.to->normal_W.dot(along);
-    bool open = line.length_m > reach_m || std::max(leaves, enters) > kOutside ||
-                (line.length_m > contact_m() && leaves + enters > -kApart);
+    const bool aside = std::max(leaves, enters) > kOutside ||
+                       (line.length_m > contact_m() && leaves + enters > -kApart);
+    bool open = line.length_m > reach_m || (aside && !fragment);
     for (float at = cell_m; !open && at < line.length_m - 0.5f * cell_m; at += 0.5f * cell_m)
       open = seen_empty(step.distance_at, line.from->point_W + at * along);
     crossing += open;
