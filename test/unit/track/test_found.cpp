@@ -79,6 +79,58 @@ TEST(Found, ThingsWhoseFacesAreInOnePlaneAreNoSidesOfOneThing) {
   EXPECT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
 }
 
+// A candidate may wait for long until it is reported: who reads the events knows the other one.
+TEST(Found, OfTwoPiecesTheOneReportedFirstGoesOn) {
+  const Scene scene = room_with({solid(kBoxClass, {0.0, 2.4}, {1.8, 0.3, 0.8})});
+  TrackerRig rig;
+  rig.eye = test::look_from({-1.0, 1.2, 1.0});
+  rig.look(scene);
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  const ObjectId candidate = rig.of_class(kBoxClass)[0]->id;
+  rig.eye = test::look_from({1.0, 1.2, 1.0});
+  rig.look_times(8, scene);
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 2u) << rig.told();
+  const ObjectId reported = rig.of_class(kBoxClass)[1]->id;
+  ASSERT_EQ(rig.confirmed(), std::set<ObjectId>{reported});
+  rig.eye = test::look_from({-1.0, 1.2, 1.0});
+  rig.look_times(8, scene);
+  ASSERT_EQ(rig.confirmed(), (std::set<ObjectId>{candidate, reported})) << rig.told();
+  rig.eye = test::look_from({0.0, 0.3, 1.0});
+  rig.look_times(2 * StateConfig().merge_frames, scene);
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, reported) << rig.told();
+}
+
+// From below, the top of a cart is not seen, and its mast is no neighbour of its sides.
+TEST(Found, WhatACartCarriesIsOfIt) {
+  const Scene scene = room_with({solid(kBoxClass, {-0.4, 2.5}, {0.9, 0.9, 0.6}),
+                                 solid(kBoxClass, {-0.4, 2.55}, {0.12, 0.12, 1.3})});
+  TrackerRig rig;
+  rig.eye = test::look_from({0.6, 0.7, 0.45}, 0.3, 0.0);
+  rig.look_times(10, scene);
+  EXPECT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  ASSERT_EQ(rig.confirmed().size(), 1u) << rig.told();
+  EXPECT_NEAR(rig.of_class(kBoxClass)[0]->box.size_m.z(), 1.3, 0.15);
+}
+
+// A low screen hides where a fork is fixed to its truck, a tall one the fork itself at first.
+TEST(Found, AForkBeforeItsTruckIsAPieceOfIt) {
+  const SceneObject truck = solid(kBoxClass, {0.0, 2.85}, {0.8, 0.5, 1.0});
+  const SceneObject fork = solid(kBoxClass, {0.0, 2.1}, {0.3, 0.5, 0.2});
+  const SceneObject low = solid(kCageClass, {0.0, 2.42}, {1.2, 0.1, 0.3});
+  TrackerRig rig;
+  rig.look_times(10, room_with({truck, fork, low, solid(kCageClass, {0.0, 1.7}, {1.2, 0.1, 0.5})}));
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  const ObjectId known = rig.of_class(kBoxClass)[0]->id;
+  const Scene seen = room_with({truck, fork, low});
+  rig.look(seen, {}, 60.0);
+  rig.look_times(10, seen);
+  ASSERT_EQ(rig.of_class(kBoxClass).size(), 1u) << rig.told();
+  EXPECT_EQ(rig.of_class(kBoxClass)[0]->id, known);
+  EXPECT_NE(rig.of_class(kBoxClass)[0]->model.nearest({0.0f, 2.1f, 0.2f}, 0.1f),
+            ObjectModel::kNone);
+}
+
 // Of what left, a screen hid nearly the half: what came is larger than what was known.
 TEST(Found, AThingOfWhichOnlyAPartWasKnownMovesAsAWhole) {
   const Eigen::Vector3d size(0.9, 0.3, 0.7);
