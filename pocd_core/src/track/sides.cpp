@@ -25,7 +25,7 @@ constexpr float kOutside = 0.4f;
 constexpr float kApart = 0.2f;
 /// A piece of at most this share of the other one's surface, so many contacts away or nearer, may
 /// lie in any direction from it: a fork or a handle is no side that faces away.
-constexpr double kFragmentShare = 0.3;
+constexpr double kFragmentShare = 0.15;
 constexpr double kFragmentContacts = 3.0;
 
 bool told_apart(const LibraryObject& a, const LibraryObject& b) {
