@@ -45,6 +45,11 @@ TEST(DatasetOptionsCli, ReadsAllFlags) {
   EXPECT_EQ(parsed.extrinsics.value().T_B_C.translation(), Eigen::Vector3d(1, 2, 3));
 }
 
+TEST(DatasetOptionsCli, RefusesWordsThatAreNoChoice) {
+  EXPECT_THROW(parse("--dataset rosbag --input a"), CLI::ValidationError);
+  EXPECT_THROW(parse("--dataset sim --input a --sensor lidar"), CLI::ValidationError);
+}
+
 // Without quotes YAML would take it for a group of keys.
 TEST(DatasetOptionsCli, ATopicMayBeginWithTheRobot) {
   CLI::App app;
