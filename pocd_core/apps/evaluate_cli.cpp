@@ -1,15 +1,20 @@
 #include "evaluate_cli.hpp"
 
 #include <CLI/CLI.hpp>
+#include <map>
 
-#include "evaluation_methods.hpp"
+#include "pocd/common/choice_option.hpp"
 
 namespace pocd {
 namespace {
 
-const std::vector<std::string> kDefaultMethods{"pocd",            "published",        "static_tsdf",
-                                               "tracked_objects", "voxel_correction", "submaps"};
-const std::vector<std::string> kFaults{"pose_jumps", "mask_gaps", "depth_holes"};
+const std::vector<Method> kDefaultMethods{
+    Method::kPocd,           Method::kPublished,       Method::kStaticTsdf,
+    Method::kTrackedObjects, Method::kVoxelCorrection, Method::kSubmaps};
+const std::map<std::string, bool FaultOptions::*> kFaults{
+    {"pose_jumps", &FaultOptions::pose_jumps},
+    {"mask_gaps", &FaultOptions::mask_gaps},
+    {"depth_holes", &FaultOptions::depth_holes}};
 
 }  // namespace
 
@@ -31,17 +36,15 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
                     ->delimiter(',');
   app.add_option("--run", o.runs, "Scenario file with several visits, as a route of its own")
       ->allow_extra_args(false);
-  auto* dataset =
-      app.add_option("--dataset", o.dataset, "Format of recordings: torwic, toycar, rgbd")
-          ->excludes(names);
+  auto* dataset = add_choice<DatasetFormat>(app, "--dataset", o.dataset,
+                                            "Format of recordings: torwic, toycar, rgbd")
+                      ->excludes(names);
   app.add_option("--input", o.inputs, "Recording; repeat it, the last one is the reference")
       ->needs(dataset)
       ->allow_extra_args(false);
   app.add_option("--suite", o.suites, "File that lists such runs, as config/evaluation/beyond.yaml")
       ->allow_extra_args(false);
-  app.add_option("--methods", o.methods, "Methods, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::IsMember(method_names()));
+  add_choices(app, "--methods", o.methods, "Methods, separated by commas");
   app.add_option("--variant", o.variants,
                  "Our method with an overlay: NAME=FILE or NAME=GROUP.KEY=VALUE[,GROUP.KEY=VALUE]")
       ->allow_extra_args(false);
@@ -51,8 +54,12 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
   app.add_option("--seeds", o.seeds, "Seeds of the simulator's noise, separated by commas")
       ->delimiter(',')
       ->capture_default_str();
-  app.add_option("--fault", o.faults,
-                 "Faults put into the frames: pose_jumps, mask_gaps, depth_holes")
+  app.add_option_function<std::vector<std::string>>(
+         "--fault",
+         [&o](const std::vector<std::string>& faults) {
+           for (const std::string& fault : faults) o.faults.*kFaults.at(fault) = true;
+         },
+         "Faults put into the frames: pose_jumps, mask_gaps, depth_holes")
       ->delimiter(',')
       ->check(CLI::IsMember(kFaults));
   app.add_option("--sensor", o.sensor,
@@ -92,7 +99,7 @@ int parse_command_line(int argc, char** argv, EvaluateOptions& o) {
       ->capture_default_str();
   try {
     app.parse(argc, argv);
-    if (!o.dataset.empty() && o.inputs.empty()) throw CLI::RequiredError("--input");
+    if (o.dataset && o.inputs.empty()) throw CLI::RequiredError("--input");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }

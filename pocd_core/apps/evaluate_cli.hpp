@@ -3,8 +3,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "evaluation_methods.hpp"
+#include "pocd/datasets/open_dataset.hpp"
+#include "pocd/eval/fault_injection.hpp"
 
 namespace pocd {
 
@@ -14,13 +19,13 @@ struct EvaluateOptions {
   std::vector<std::string> names;             ///< empty: every scenario of the folder
   std::vector<std::filesystem::path> runs;    ///< scenario files with several visits
   std::vector<std::filesystem::path> suites;  ///< files that list such
-  std::string dataset;                        ///< recordings instead: their format
+  std::optional<DatasetFormat> dataset;       ///< recordings instead: their format
   std::vector<std::filesystem::path> inputs;
-  std::vector<std::string> methods;
+  std::vector<Method> methods;
   std::vector<std::string> variants;  ///< NAME=FILE or NAME=GROUP.KEY=VALUE,...
   std::vector<std::filesystem::path> variant_files;
   std::vector<std::uint64_t> seeds = {1, 2, 3};
-  std::vector<std::string> faults;
+  FaultOptions faults;
   std::filesystem::path sensor;  ///< model for every simulated scenario; empty: its own
   std::vector<std::string> sim;
   std::vector<std::filesystem::path> config;

@@ -8,21 +8,13 @@
 
 namespace pocd {
 
-const std::vector<std::string>& method_names() {
-  static const std::vector<std::string> names{
-      "pocd",    "published",        "static_tsdf",         "tracked_objects",
-      "submaps", "voxel_correction", "tracked_objects_keep"};
-  return names;
-}
-
 MethodSpec make_method(const Variant& variant, const BaseConfig& base) {
   std::vector<std::filesystem::path> files = base.files;
   files.insert(files.end(), variant.config.begin(), variant.config.end());
   std::vector<std::string> overrides = base.overrides;
   PipelineConfig config;
   BaselineConfig own;
-  const std::string& method = variant.method;
-  if (method == "pocd") {
+  if (variant.method == Method::kPocd) {
     overrides.insert(overrides.end(), variant.set.begin(), variant.set.end());
   } else {
     load_config(own, base.method_files, variant.set);
@@ -30,19 +22,27 @@ MethodSpec make_method(const Variant& variant, const BaseConfig& base) {
   load_config(config, files, overrides);
   MethodSpec spec;
   spec.name = variant.name;
-  if (method == "static_tsdf") {
-    spec.make = [=] { return make_static_tsdf_method(config, own.static_tsdf); };
-  } else if (method == "voxel_correction") {
-    spec.make = [=] { return make_voxel_correction_method(config, own.voxel_correction); };
-  } else if (method == "submaps") {
-    spec.make = [=] { return make_submap_method(config, own.submaps); };
-  } else if (method == "published") {
-    spec.make = [=] { return make_published_method(config, own.published); };
-  } else if (method == "pocd") {
-    spec.make = [=] { return make_pocd_method(config); };
-  } else {
-    own.tracked_objects.keep_lost |= method == "tracked_objects_keep";
-    spec.make = [=] { return make_tracked_objects_method(config, own.tracked_objects); };
+  switch (variant.method) {
+    case Method::kPocd:
+      spec.make = [=] { return make_pocd_method(config); };
+      break;
+    case Method::kPublished:
+      spec.make = [=] { return make_published_method(config, own.published); };
+      break;
+    case Method::kStaticTsdf:
+      spec.make = [=] { return make_static_tsdf_method(config, own.static_tsdf); };
+      break;
+    case Method::kSubmaps:
+      spec.make = [=] { return make_submap_method(config, own.submaps); };
+      break;
+    case Method::kVoxelCorrection:
+      spec.make = [=] { return make_voxel_correction_method(config, own.voxel_correction); };
+      break;
+    case Method::kTrackedObjects:
+    case Method::kTrackedObjectsKeep:
+      own.tracked_objects.keep_lost |= variant.method == Method::kTrackedObjectsKeep;
+      spec.make = [=] { return make_tracked_objects_method(config, own.tracked_objects); };
+      break;
   }
   return spec;
 }

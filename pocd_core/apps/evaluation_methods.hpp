@@ -10,20 +10,36 @@
 
 namespace pocd {
 
-/// pocd, published, static_tsdf, tracked_objects, tracked_objects_keep, submaps, voxel_correction.
-const std::vector<std::string>& method_names();
+enum class Method {
+  kPocd,                ///< the pipeline itself
+  kPublished,           ///< make_published_method()
+  kStaticTsdf,          ///< make_static_tsdf_method()
+  kTrackedObjects,      ///< make_tracked_objects_method()
+  kSubmaps,             ///< make_submap_method()
+  kVoxelCorrection,     ///< make_voxel_correction_method()
+  kTrackedObjectsKeep,  ///< tracked objects of which lost ones are kept
+};
+inline EnumWords<Method> words_of(Method) {
+  return {{Method::kPocd, "pocd"},
+          {Method::kPublished, "published"},
+          {Method::kStaticTsdf, "static_tsdf"},
+          {Method::kTrackedObjects, "tracked_objects"},
+          {Method::kSubmaps, "submaps"},
+          {Method::kVoxelCorrection, "voxel_correction"},
+          {Method::kTrackedObjectsKeep, "tracked_objects_keep"}};
+}
 
 /// A method with other parameters.
 struct Variant {
   std::string name;
-  std::string method = "pocd";
+  Method method = Method::kPocd;
   std::vector<std::string> config;
   std::vector<std::string> set;
 
   template <class Visitor>
   void describe(Visitor& visit) {
     visit("name", name, "Name in the tables.");
-    visit("method", method, Choices{method_names()}, "Method that it is a variant of.");
+    visit("method", method, "Method that it is a variant of.");
     visit("config", config, "Configuration files over those of the command line, beside this one.");
     visit("set", set, "Parameters: GROUP.KEY=VALUE; a baseline's group is its name.");
   }

@@ -11,7 +11,6 @@
 #include "pocd/common/check.hpp"
 #include "pocd/common/natural_order.hpp"
 #include "pocd/config/config_io.hpp"
-#include "pocd/datasets/open_dataset.hpp"
 #include "pocd/sim/scenario_yaml.hpp"
 #include "pocd/sim/sim_reader.hpp"
 
@@ -20,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-DatasetOptions recordings(const std::string& format, const std::vector<fs::path>& inputs) {
+DatasetOptions recordings(DatasetFormat format, const std::vector<fs::path>& inputs) {
   DatasetOptions dataset;
   dataset.format = format;
   dataset.inputs = inputs;
@@ -100,8 +99,9 @@ RouteRunner::RouteRunner(const std::vector<Route>& routes, const RunnerOptions& 
     : routes_(routes), options_(options) {
   for (const Route& route : routes_) {
     truths_[&route];
-    if (!options_.dataset.empty()) {
-      jobs_.push_back({&route, 0, open_dataset(recordings(options_.dataset, route.files))->size()});
+    if (options_.dataset) {
+      jobs_.push_back(
+          {&route, 0, open_dataset(recordings(*options_.dataset, route.files))->size()});
       continue;
     }
     const std::size_t frames = SimSchedule(scenario_of(route)).frames().size();
@@ -158,13 +158,9 @@ EvaluationInput RouteRunner::input_of(const Job& job) {
   input.route = job.route->name;
   input.seed = job.seed;
   input.with_reference = options_.with_reference;
-  for (const std::string& fault : options_.faults) {
-    input.faults.pose_jumps |= fault == "pose_jumps";
-    input.faults.mask_gaps |= fault == "mask_gaps";
-    input.faults.depth_holes |= fault == "depth_holes";
-  }
+  input.faults = options_.faults;
   input.faults.seed = job.seed;
-  if (!options_.dataset.empty()) {
+  if (options_.dataset) {
     open_recordings(*job.route, input);
     return input;
   }
@@ -183,9 +179,9 @@ void RouteRunner::open_recordings(const Route& route, EvaluationInput& input) co
   std::uint64_t begin = 0;
   for (const fs::path& file : route.files) {
     input.visit_begin.push_back(begin);
-    begin += open_dataset(recordings(options_.dataset, {file}))->size();
+    begin += open_dataset(recordings(*options_.dataset, {file}))->size();
   }
-  input.reader = open_dataset(recordings(options_.dataset, route.files));
+  input.reader = open_dataset(recordings(*options_.dataset, route.files));
 }
 
 /// Made once per route, for all its seeds.

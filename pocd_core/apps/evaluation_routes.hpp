@@ -5,9 +5,11 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "pocd/datasets/open_dataset.hpp"
 #include "pocd/eval/evaluation.hpp"
 
 namespace pocd {
@@ -22,9 +24,9 @@ struct Route {
 std::vector<std::string> scenario_names(const std::filesystem::path& folder);
 
 struct RunnerOptions {
-  std::string dataset;  ///< of recordings; empty: the simulator
+  std::optional<DatasetFormat> dataset;  ///< of recordings; none: the simulator
   std::vector<std::uint64_t> seeds = {1};
-  std::vector<std::string> faults;
+  FaultOptions faults;
   std::filesystem::path sensor;  ///< file of a sensor model for every scenario; empty: its own
   std::vector<std::string> sim;  ///< changes of every scenario, KEY=VALUE
   PipelineConfig config;         ///< for depth limit, map voxels, classes

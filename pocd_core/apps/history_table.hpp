@@ -6,11 +6,15 @@
 #include <utility>
 #include <vector>
 
+#include "pocd/common/enum_words.hpp"
 #include "pocd/memory/history.hpp"
 
 namespace pocd {
 
 enum class TableFormat { kCsv, kJson };
+inline EnumWords<TableFormat> words_of(TableFormat) {
+  return {{TableFormat::kCsv, "csv"}, {TableFormat::kJson, "json"}};
+}
 
 /// A row is a list of (column, value); a value that is a number is given as one.
 class HistoryTable {

@@ -159,7 +159,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
     std::optional<Frame> frame = reader->next();
     // The pose that a node would get, in every bit; a recording's frames have made that way
     // already.
-    if (frame && options.dataset.format != "mcap") {
+    if (frame && options.dataset.format != DatasetFormat::kMcap) {
       frame->T_W_C = through_messages(frame->T_W_C, reader->extrinsics().T_B_C);
     }
     const StageTiming read{"read", 1e3 * seconds_since(read_start),
@@ -168,7 +168,7 @@ void process_all(const MapRunOptions& options, PocdPipeline& pipeline, MapMemory
       report("skipped: " + reader->problems()[reported]);
     }
     if (!frame) break;
-    if (options.dataset.format != "mcap") unlisted.look(frame->labels);
+    if (options.dataset.format != DatasetFormat::kMcap) unlisted.look(frame->labels);
     stamp_ns = frame->stamp_ns;
     if (already > 0) {
       --already;
@@ -252,7 +252,7 @@ RunSummary run_map(const MapRunOptions& options, std::ostream& log) {
 
   RunSummary summary;
   summary.version = POCD_VERSION;
-  summary.dataset = options.dataset.format;
+  summary.dataset = word_of(options.dataset.format);
   for (const auto& input : options.dataset.inputs) summary.inputs.push_back(input.string());
   summary.config = options.config;
 

@@ -110,7 +110,7 @@ int main(int argc, char** argv) {
   try {
     if (!states.empty()) return check_states(states, truth, config, with_masks);
     pocd::DatasetOptions options;
-    options.format = "rgbd";
+    options.format = pocd::DatasetFormat::kRgbd;
     options.inputs = {still};
     if (!gravity.empty())
       options.gravity_W = Eigen::Vector3d(gravity[0], gravity[1], gravity[2]).normalized();

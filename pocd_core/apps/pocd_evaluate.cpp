@@ -23,7 +23,7 @@ struct Suite {
 };
 
 std::vector<pocd::Route> list_routes(const pocd::EvaluateOptions& o) {
-  if (!o.dataset.empty()) {
+  if (o.dataset) {
     std::string name;
     for (const fs::path& input : o.inputs)
       name += (name.empty() ? "" : "+") + input.filename().string();
@@ -50,7 +50,9 @@ std::vector<pocd::Route> list_routes(const pocd::EvaluateOptions& o) {
 
 std::vector<pocd::MethodSpec> list_methods(const pocd::EvaluateOptions& o) {
   std::vector<pocd::Variant> variants;
-  for (const std::string& name : o.methods) variants.push_back({name, name, {}, {}});
+  for (const pocd::Method method : o.methods) {
+    variants.push_back({pocd::word_of(method), method, {}, {}});
+  }
   for (const std::string& text : o.variants) variants.push_back(pocd::parse_variant(text));
   for (const fs::path& file : o.variant_files) {
     for (pocd::Variant& variant : pocd::load_variants(file)) variants.push_back(std::move(variant));
@@ -66,7 +68,7 @@ std::vector<pocd::MethodSpec> list_methods(const pocd::EvaluateOptions& o) {
 void draw_run(const pocd::EvaluateOptions& o, double remove_below, double voxel_size_m,
               pocd::RunScore& run) {
   const fs::path folder = o.output / run.route;
-  if (o.pictures && (run.seed == o.seeds.front() || !o.dataset.empty())) {
+  if (o.pictures && (run.seed == o.seeds.front() || o.dataset)) {
     fs::create_directories(folder);
     for (const pocd::MethodScore& m : run.methods) {
       pocd::draw_voxels(m.by_truth ? *m.by_truth : m.by_reference, voxel_size_m,

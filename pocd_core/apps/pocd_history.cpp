@@ -4,12 +4,14 @@
 
 #include "history_table.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/choice_option.hpp"
 
 namespace {
 
 struct Options {
   std::filesystem::path folder;
-  std::string format = "csv", time, from, to;
+  pocd::TableFormat format = pocd::TableFormat::kCsv;
+  std::string time, from, to;
   std::uint32_t object = 0;
   std::uint64_t after = 0;
   double least_m = 0.05;
@@ -23,28 +25,27 @@ void show(const CLI::App& app, const Options& options) {
     const auto name = names.find(id);
     return name == names.end() ? "class_" + std::to_string(id) : name->second;
   };
-  const auto format = options.format == "json" ? pocd::TableFormat::kJson : pocd::TableFormat::kCsv;
   const auto add_event = [&](pocd::HistoryTable& table, const pocd::LoggedEvent& logged) {
     table.row(to_string(logged.event.kind), logged, name_of(logged.event.class_id),
               logged.event.previous_box);
   };
   if (app.got_subcommand("at")) {
     const pocd::HistoryState state = history.state_at(pocd::parse_time(options.time));
-    pocd::HistoryTable table(std::cout, format);
+    pocd::HistoryTable table(std::cout, options.format);
     for (const auto& entry : state) add_event(table, entry.second);
   } else if (app.got_subcommand("diff")) {
     const auto list = history.between(pocd::parse_time(options.from), pocd::parse_time(options.to),
                                       options.least_m);
-    pocd::HistoryTable table(std::cout, format);
+    pocd::HistoryTable table(std::cout, options.format);
     for (const pocd::Difference& d : list) {
       table.row(to_string(d.kind), d.evidence, name_of(d.evidence.event.class_id), d.before);
     }
   } else if (app.got_subcommand("object")) {
     const auto life = history.life_of(static_cast<pocd::ObjectId>(options.object));
-    pocd::HistoryTable table(std::cout, format);
+    pocd::HistoryTable table(std::cout, options.format);
     for (const pocd::LoggedEvent& logged : life) add_event(table, logged);
   } else {
-    pocd::HistoryTable table(std::cout, format);
+    pocd::HistoryTable table(std::cout, options.format);
     std::uint64_t after = options.after;
     constexpr std::size_t kPage = 1000;
     for (std::size_t got = kPage; got == kPage;) {
@@ -78,9 +79,7 @@ int main(int argc, char** argv) {
   const auto add = [&](const char* name, const char* text) {
     CLI::App* sub = app.add_subcommand(name, text);
     sub->add_option("folder", options.folder, "Folder of the memory")->required();
-    sub->add_option("--format", options.format, "csv or json")
-        ->check(CLI::IsMember({"csv", "json"}))
-        ->capture_default_str();
+    pocd::add_choice(*sub, "--format", options.format, "csv or json");
     return sub;
   };
   add("at", "The objects at a time, each with the last event about it")

@@ -8,6 +8,7 @@
 #include "evaluation_methods.hpp"
 #include "evaluation_routes.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/choice_option.hpp"
 #include "pocd/common/random.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd/eval/evaluation_report.hpp"
@@ -29,13 +30,13 @@ struct SearchParameter {
 };
 
 struct SearchMethod {
-  std::string name;
+  pocd::Method name = pocd::Method::kPocd;
   int samples = 16;
   std::vector<SearchParameter> parameters;
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("name", name, pocd::Choices{pocd::method_names()}, "Method.");
+    visit("name", name, "Method.");
     visit("samples", samples, pocd::Range{1, 10000},
           "Combinations to try beside the defaults; all of them where there are no more.");
     visit("parameters", parameters, "What to search.");
@@ -55,7 +56,9 @@ struct SearchSpace {
 std::vector<std::vector<std::string>> combinations(const SearchMethod& method, std::uint64_t seed) {
   double total = 1.0;
   for (const SearchParameter& p : method.parameters) {
-    if (p.values.empty()) throw pocd::InputError(method.name + ": " + p.key + " has no values");
+    if (p.values.empty()) {
+      throw pocd::InputError(word_of(method.name) + ": " + p.key + " has no values");
+    }
     total *= static_cast<double>(p.values.size());
   }
   const auto named = [&](std::uint64_t number) {
@@ -123,7 +126,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", POCD_VERSION);
   fs::path space_file = "config/evaluation/tuning.yaml", output;
   std::vector<fs::path> runs, config;
-  std::vector<std::string> only;
+  std::vector<pocd::Method> only;
   pocd::RunnerOptions options;
   options.with_reference = false;
   options.seeds = {101};
@@ -135,7 +138,7 @@ int main(int argc, char** argv) {
   app.add_option("--config", config, "Configuration file; repeat it to overlay several")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--methods", only, "Of the space, these only")->delimiter(',');
+  pocd::add_choices(app, "--methods", only, "Of the space, these only");
   app.add_option("--seeds", options.seeds, "Seeds of the simulator's noise")
       ->delimiter(',')
       ->capture_default_str();
@@ -164,8 +167,9 @@ int main(int argc, char** argv) {
       for (const auto& set : sets) {
         std::string text;
         for (const std::string& one : set) text += (text.empty() ? "" : " ") + one;
-        candidates.push_back({method.name, set.empty() ? "defaults" : text, 0.0, {}});
-        specs.push_back(pocd::make_method({method.name, method.name, {}, set}, {config, {}, {}}));
+        const std::string name = word_of(method.name);
+        candidates.push_back({name, set.empty() ? "defaults" : text, 0.0, {}});
+        specs.push_back(pocd::make_method({name, method.name, {}, set}, {config, {}, {}}));
       }
     }
   } catch (const pocd::InputError& error) {

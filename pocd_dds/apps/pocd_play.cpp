@@ -3,8 +3,8 @@
 
 #include "apps/common.hpp"
 #include "pocd/config/config_io.hpp"
-#include "pocd/datasets/dataset_options_cli.hpp"
 #include "pocd/config/node_config.hpp"
+#include "pocd/datasets/dataset_options_cli.hpp"
 #include "pocd/network/segmentation_network.hpp"
 #include "pocd_dds/play/player.hpp"
 #include "pocd_dds/recording/replayer.hpp"
@@ -156,7 +156,7 @@ int main(int argc, char** argv) {
     pocd::load_config(file, files, input_settings);
     dataset.input = file.node;
     dataset.classes = file.pipeline.classes;
-    if (dataset.with_color) dataset.input.color = "optional";
+    if (dataset.with_color) dataset.input.color = pocd::StreamUse::kOptional;
     if (!network.empty()) dataset.input.use_color_alone();
     options.bus.domain = domain >= 0 ? domain : pocd::dds::default_domain();
   } catch (const CLI::ParseError& error) {

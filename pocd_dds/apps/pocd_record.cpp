@@ -5,6 +5,7 @@
 
 #include "apps/common.hpp"
 #include "apps/heap_return.hpp"
+#include "pocd/common/choice_option.hpp"
 #include "pocd_dds/recording/recorder.hpp"
 
 namespace {
@@ -58,7 +59,6 @@ int main(int argc, char** argv) {
   pocd::dds::RecorderOptions options;
   options.bus.name = "pocd_record";
   std::vector<std::string> topics;
-  std::string compression = "zstd";
   double split_mb = 0.0, split_s = 0.0, ring_mb = 0.0, queue_mb = 512.0;
   app.set_version_flag("--version", POCD_VERSION);
   app.add_option("--output", options.output, "File to write; with --split-*, FILE_0000.mcap ...")
@@ -72,9 +72,7 @@ int main(int argc, char** argv) {
   app.add_flag("--rerun", options.rerun,
                "Also what Rerun's viewer shows: colours of clouds, boxes of markers, poses of "
                "odometry; clouds get a field \"colors\", the rest topics of its own, TOPIC/rerun");
-  app.add_option("--compression", compression, "Of the chunks")
-      ->check(CLI::IsMember({"none", "lz4", "zstd"}))
-      ->capture_default_str();
+  pocd::add_choice(app, "--compression", options.split.mcap.compression, "Of the chunks");
   app.add_option("--level", options.split.mcap.level, "Level of zstd")
       ->check(CLI::Range(-7, 19))
       ->capture_default_str();
@@ -104,7 +102,6 @@ int main(int argc, char** argv) {
     return 2;
   }
   if (!topics.empty()) options.topics = topics;
-  options.split.mcap.compression = compression == "none" ? "" : compression;
   if (ring_mb > 0.0 && split_mb == 0.0) split_mb = 0.1 * ring_mb;
   options.split.most_bytes = static_cast<std::uint64_t>(split_mb * 1e6);
   options.split.keep_bytes = static_cast<std::uint64_t>(ring_mb * 1e6);

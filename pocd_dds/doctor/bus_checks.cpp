@@ -16,8 +16,8 @@ struct Expected {
   std::string lacking;  ///< what it means that nobody announces it
 };
 
-Severity severity_of(const std::string& use) {
-  return use == "required" ? Severity::kError : Severity::kNote;
+Severity severity_of(StreamUse use) {
+  return use == StreamUse::kRequired ? Severity::kError : Severity::kNote;
 }
 
 std::vector<Expected> expected_of(const NodeConfig& node) {
@@ -25,10 +25,10 @@ std::vector<Expected> expected_of(const NodeConfig& node) {
       {InputStream::kDepth, Severity::kError, "no depth images: the robot is not there"},
       {InputStream::kCameraInfo, Severity::kError,
        "no intrinsics: none of its images can be used"}};
-  if (node.segmentation != "absent") {
+  if (node.segmentation != StreamUse::kAbsent) {
     list.push_back({InputStream::kSegmentation, severity_of(node.segmentation), "no segmentation"});
   }
-  if (node.color != "absent") {
+  if (node.color != StreamUse::kAbsent) {
     list.push_back({InputStream::kColor, severity_of(node.color), "no colour images"});
   }
   return list;

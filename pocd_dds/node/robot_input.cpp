@@ -50,8 +50,8 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
       wakeup_(wakeup),
       latency_(latency),
       streams_(robot, context),
-      segmentation_required_(node.segmentation == "required"),
-      color_required_(node.color == "required"),
+      segmentation_required_(node.segmentation == StreamUse::kRequired),
+      color_required_(node.color == StreamUse::kRequired),
       tf_(has_own_tf(node, robot)
               ? std::make_unique<TransformInput>(participant, streams_.topic(InputStream::kTf),
                                                  streams_.topic(InputStream::kTfStatic),
@@ -65,8 +65,9 @@ RobotInput::RobotInput(const std::shared_ptr<Participant>& participant, const No
     return std::make_unique<ImageReader>(participant, stream, streams_.topic(stream), node.lossless,
                                          wakeup);
   };
-  if (node.segmentation != "absent") segmentation_ = image_reader(InputStream::kSegmentation);
-  if (node.color != "absent") color_ = image_reader(InputStream::kColor);
+  if (node.segmentation != StreamUse::kAbsent)
+    segmentation_ = image_reader(InputStream::kSegmentation);
+  if (node.color != StreamUse::kAbsent) color_ = image_reader(InputStream::kColor);
   depth_ = image_reader(InputStream::kDepth);
 }
 

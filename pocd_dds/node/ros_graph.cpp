@@ -26,7 +26,7 @@ RosGraph::RosGraph(std::shared_ptr<Participant> participant, const RosOutputConf
   name_ = outputs.ros_node.substr(slash == std::string::npos ? 0 : slash + 1);
   namespace_ = slash == std::string::npos ? "" : outputs.ros_node.substr(0, slash);
   if (namespace_.empty() || namespace_[0] != '/') namespace_ = "/" + namespace_;
-  if (outputs.ros_release == "humble") {
+  if (outputs.ros_release == RosRelease::kHumble) {
     humble_writer_ = std::make_unique<decltype(humble_writer_)::element_type>(
         participant_, topics::kRosGraph, topics::kRosGraph.name);
   } else {

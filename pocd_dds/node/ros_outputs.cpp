@@ -70,7 +70,7 @@ RosOutputs::RosOutputs(const std::shared_ptr<Participant>& participant, const No
   make(grid_, occupancy_pace_, topics::kOccupancy);
   make(grid_updates_, occupancy_pace_, topics::kOccupancyUpdates);
   make(surface_, surface_pace_, topics::kSurface);
-  if (rates_.ros_release != "humble") {
+  if (rates_.ros_release != RosRelease::kHumble) {
     make(obstacles_, obstacles_pace_, topics::kRmfObstacles);
   } else if (!obstacles_pace_.off()) {
     humble_obstacles_ = std::make_unique<decltype(humble_obstacles_)::element_type>(

@@ -27,8 +27,8 @@ constexpr Delivery kMasks{true, false, 5, 0, 0, false, 0};
 constexpr Delivery kLossless{true, false, 0, 64, 0, false, 0};
 
 InputConfig colours_of(InputConfig input) {
-  input.color = "required";
-  input.segmentation = "optional";  // to notice that masks come from elsewhere
+  input.color = StreamUse::kRequired;
+  input.segmentation = StreamUse::kOptional;  // to notice that masks come from elsewhere
   return input;
 }
 

@@ -95,7 +95,10 @@ TEST_F(PocdMapInput, SeveralConfigErrorsAreListedAtOnce) {
 }
 
 TEST_F(PocdMapInput, UnknownFormatIsNamed) {
-  expect_one_line_failure(run(kGoodConfig, in_, "rosbag"), "rosbag");
+  const CommandResult result = run(kGoodConfig, in_, "rosbag");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(contains(result.err, "--dataset: rosbag not in {torwic,toycar,rgbd,pcd,sim,mcap}"))
+      << result.err;
 }
 
 TEST_F(PocdMapInput, MissingFolderIsNamed) {

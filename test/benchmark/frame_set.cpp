@@ -63,7 +63,7 @@ std::string data_folder() {
 FrameSet load_redkitchen(std::size_t limit) {
   FrameSet set = with_config("redkitchen", "redkitchen.yaml");
   DatasetOptions options;
-  options.format = "rgbd";
+  options.format = DatasetFormat::kRgbd;
   options.inputs = {data_folder() + "/redkitchen"};
   if (is_missing(options.inputs.front(), set)) return set;
   options.gravity_W = Eigen::Vector3d(-0.00887, 0.90443, 0.42654).normalized();

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   }
   const double seconds = std::atof(argv[2]), bytes_per_s = 1e6 * std::atof(argv[3]);
   McapWriterOptions options;
-  options.compression = "";  // the player's time is not what is measured
+  options.compression = ChunkCompression::kNone;  // the player's time is not what is measured
   McapWriter writer(argv[1], options);
   const auto schema = writer.add_schema("sensor_msgs/msg/Image", "", "");
   std::vector<std::uint16_t> channels;

@@ -47,7 +47,7 @@ class RobotRecording {
  private:
   static McapWriterOptions uncompressed() {
     McapWriterOptions options;
-    options.compression = "";
+    options.compression = ChunkCompression::kNone;
     return options;
   }
 

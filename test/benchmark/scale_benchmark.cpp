@@ -160,7 +160,7 @@ void run(const std::vector<double>& areas_m2, int budget_mb, double budget_area_
   for (const double area_m2 : areas_m2) add(config, area_m2, "");
   if (budget_mb > 0) {
     PipelineConfig limited = config;
-    limited.map.memory.limit = "budget";
+    limited.map.memory.limit = MapLimit::kBudget;
     limited.map.memory.budget_mb = budget_mb;
     limited.map.memory.folder = folder;
     add(limited, budget_area_m2, ", budget " + std::to_string(budget_mb) + " MiB");

@@ -141,8 +141,8 @@ TEST(ImagesFrom, RandomHeadersNeverReadBeyondTheData) {
 
 TEST(LabelsFrom, ColoursBecomeClassesAndUnknownOnesAreCounted) {
   ClassMap classes;
-  classes.list = {ClassInfo{7, "box", "object", 0, "0,153,153"},
-                  ClassInfo{4, "fence", "object", 1, "255, 0, 102"}};
+  classes.list = {ClassInfo{7, "box", ClassRole::kObject, 0, "0,153,153"},
+                  ClassInfo{4, "fence", ClassRole::kObject, 1, "255, 0, 102"}};
   const LabelTable colours(classes);
   for (const bool rgb : {true, false}) {
     auto message = image(rgb ? "rgb8" : "bgr8", 3);
@@ -216,11 +216,12 @@ TEST(ImagesFrom, RedGreenBlueIsTurnedRound) {
 TEST(LabelTable, RefusesColoursThatAreNone) {
   for (const char* rgb : {"1,2", "1,2,256", "-1,2,3", "red", "1,2,3,4", "1,2,3x"}) {
     ClassMap classes;
-    classes.list = {ClassInfo{7, "box", "object", 0, rgb}};
+    classes.list = {ClassInfo{7, "box", ClassRole::kObject, 0, rgb}};
     EXPECT_THROW(LabelTable{classes}, InputError) << rgb;
   }
   ClassMap twice;
-  twice.list = {ClassInfo{1, "a", "object", 0, "1,2,3"}, ClassInfo{2, "b", "object", 0, "1,2,3"}};
+  twice.list = {ClassInfo{1, "a", ClassRole::kObject, 0, "1,2,3"},
+                ClassInfo{2, "b", ClassRole::kObject, 0, "1,2,3"}};
   EXPECT_THROW(LabelTable{twice}, InputError);
 }
 

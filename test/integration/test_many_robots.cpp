@@ -22,7 +22,7 @@ struct IntakeOnABus {
  private:
   static NodeConfig without_masks() {
     NodeConfig config;
-    config.segmentation = "absent";
+    config.segmentation = StreamUse::kAbsent;
     return config;
   }
   static std::shared_ptr<dds::Participant> listening(const TestDomain& domain,

@@ -126,9 +126,9 @@ TEST(RosOutputsAlone, ObstaclesAreRefreshedInTimeAndGoByLapse) {
 TEST(RosOutputsAlone, ObstaclesHaveTheFormOfTheRelease) {
   RosOutputConfig rates;
   rates.markers_hz = rates.occupancy_hz = rates.surface_hz = 0.0;
-  rates.ros_release = "humble";
+  rates.ros_release = RosRelease::kHumble;
   OutputsInSimulatedTime humble(rates);
-  rates.ros_release = "iron";
+  rates.ros_release = RosRelease::kIron;
   OutputsInSimulatedTime iron(rates);
   dds::Wakeup wakeup;
   // One participant has one form of a type.

@@ -31,7 +31,7 @@ class Cyclone : public testing::Test {
     const std::filesystem::path folder = folder_->path();
     expected_ = offline_run(small_drives(), folder / "offline");
     DatasetOptions dataset;
-    dataset.format = "sim";
+    dataset.format = DatasetFormat::kSim;
     dataset.inputs = {small_drives()};
     dataset.with_color = false;
     PipelineConfig config;

@@ -94,7 +94,7 @@ inline std::vector<Frame> frames_of(DatasetReader& reader) {
 
 inline DatasetOptions options_for(std::vector<std::filesystem::path> inputs) {
   DatasetOptions options;
-  options.format = "mcap";
+  options.format = DatasetFormat::kMcap;
   options.inputs = std::move(inputs);
   return options;
 }

@@ -34,6 +34,9 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+inline constexpr ChunkCompression kCompressions[] = {
+    ChunkCompression::kNone, ChunkCompression::kLz4, ChunkCompression::kZstd};
+
 inline Bytes file_bytes(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return Bytes((std::istreambuf_iterator<char>(in)), {});

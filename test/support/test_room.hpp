@@ -23,7 +23,7 @@ constexpr ClassId kWallClass = 0, kFloorClass = 1, kFenceClass = 4, kFenceAlias 
 
 inline ClassMap room_classes() {
   ClassMap map;
-  const auto add = [&](int id, const char* name, const char* role, int stationarity_class) {
+  const auto add = [&](int id, const char* name, ClassRole role, int stationarity_class) {
     ClassInfo info;
     info.id = id;
     info.name = name;
@@ -31,14 +31,14 @@ inline ClassMap room_classes() {
     info.stationarity_class = stationarity_class;
     map.list.push_back(info);
   };
-  add(kWallClass, "wall", "background", 1);
-  add(kFloorClass, "floor", "ground", 1);
-  add(kRobotClass, "robot", "ignore", 0);
-  add(kFenceClass, "fence", "object", 1);
-  add(kFenceAlias, "fence", "object", 1);
-  add(kBoxClass, "box", "object", 0);
-  add(kCageClass, "cage", "object", 0);
-  add(kPersonClass, "person", "dynamic", 0);
+  add(kWallClass, "wall", ClassRole::kBackground, 1);
+  add(kFloorClass, "floor", ClassRole::kGround, 1);
+  add(kRobotClass, "robot", ClassRole::kIgnore, 0);
+  add(kFenceClass, "fence", ClassRole::kObject, 1);
+  add(kFenceAlias, "fence", ClassRole::kObject, 1);
+  add(kBoxClass, "box", ClassRole::kObject, 0);
+  add(kCageClass, "cage", ClassRole::kObject, 0);
+  add(kPersonClass, "person", ClassRole::kDynamic, 0);
   return map;
 }
 

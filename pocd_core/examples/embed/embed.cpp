@@ -7,7 +7,8 @@
 
 int main() {
   pocd::PipelineConfig config;  // every field is described in docs/parameters.md
-  config.classes.list = {{0, "wall", "background", 1}, {1, "box", "object", 0}};
+  config.classes.list = {{0, "wall", pocd::ClassRole::kBackground, 1},
+                         {1, "box", pocd::ClassRole::kObject, 0}};
   pocd::PocdPipeline pipeline(config);
 
   const pocd::CameraModel camera{320, 240, 240.0, 240.0, 159.5, 119.5};

@@ -20,10 +20,10 @@ void ParameterCheck::natural(const char* name, std::uint64_t& value, const Range
   number(name, static_cast<double>(value), range, doc);
 }
 
-void ParameterCheck::choice(const char* name, std::string& value, const Choices& choices,
-                            const char*) {
-  if (std::find(choices.words.begin(), choices.words.end(), value) != choices.words.end()) return;
-  report(name, "\"" + value + "\" is not one of: " + join(choices.words, ", "));
+void ParameterCheck::choice(const char* name, std::string& word,
+                            const std::vector<std::string>& choices, const char*) {
+  if (std::find(choices.begin(), choices.end(), word) != choices.end()) return;
+  report(name, config_detail::not_one_of(word, choices));
 }
 
 void ParameterCheck::items(const char* name, ItemList& list, const char*) {

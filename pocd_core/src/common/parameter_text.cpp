@@ -76,6 +76,10 @@ std::string join(const std::vector<std::string>& words, const std::string& separ
   return text;
 }
 
+std::string not_one_of(const std::string& word, const std::vector<std::string>& choices) {
+  return "\"" + word + "\" is not one of: " + join(choices, ", ");
+}
+
 std::optional<std::string> closest(const std::string& word,
                                    const std::vector<std::string>& candidates) {
   // A third of the letters wrong is still a typing error; more is another word.

@@ -26,6 +26,9 @@ std::string range_text(const Range& range, const std::string& doc);
 
 std::string join(const std::vector<std::string>& words, const std::string& separator);
 
+/// "\"word\" is not one of: a, b".
+std::string not_one_of(const std::string& word, const std::vector<std::string>& choices);
+
 /// The candidate that `word` is a likely misspelling or shortening of, if there is one.
 std::optional<std::string> closest(const std::string& word,
                                    const std::vector<std::string>& candidates);

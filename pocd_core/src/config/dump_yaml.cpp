@@ -26,8 +26,9 @@ class Dumper final : public ParameterSink {
   void text(const char* name, std::string& value, const char*) override {
     out_ << YAML::Key << name << YAML::Value << YAML::DoubleQuoted << value;
   }
-  void choice(const char* name, std::string& value, const Choices&, const char*) override {
-    out_ << YAML::Key << name << YAML::Value << value;
+  void choice(const char* name, std::string& word, const std::vector<std::string>&,
+              const char*) override {
+    out_ << YAML::Key << name << YAML::Value << word;
   }
   void texts(const char* name, std::vector<std::string>& values, const char*) override {
     out_ << YAML::Key << name << YAML::Value << YAML::BeginSeq;

@@ -37,9 +37,9 @@ class Page final : public ParameterSink {
   void text(const char* name, std::string& value, const char* doc) override {
     row(name, code(value), "text", doc);
   }
-  void choice(const char* name, std::string& value, const Choices& choices,
+  void choice(const char* name, std::string& word, const std::vector<std::string>& choices,
               const char* doc) override {
-    row(name, code(value), join(choices.words, ", "), doc);
+    row(name, code(word), join(choices, ", "), doc);
   }
   void texts(const char* name, std::vector<std::string>& values, const char* doc) override {
     row(name, code(join(values, ", ")), "list of texts", doc);

@@ -84,14 +84,15 @@ void YamlLoader::text(const char* name, std::string& value, const char*) {
   if (entry && is_text(*entry, name)) value = entry->value.Scalar();
 }
 
-void YamlLoader::choice(const char* name, std::string& value, const Choices& choices, const char*) {
+void YamlLoader::choice(const char* name, std::string& word,
+                        const std::vector<std::string>& choices, const char*) {
   const std::optional<Entry> entry = find(name);
   if (!entry || !is_text(*entry, name)) return;
-  const std::string word = entry->value.Scalar();
-  if (std::find(choices.words.begin(), choices.words.end(), word) != choices.words.end()) {
-    value = word;
+  const std::string text = entry->value.Scalar();
+  if (std::find(choices.begin(), choices.end(), text) != choices.end()) {
+    word = text;
   } else {
-    report(entry->line, path(name), "\"" + word + "\" is not one of: " + join(choices.words, ", "));
+    report(entry->line, path(name), not_one_of(text, choices));
   }
 }
 

@@ -26,7 +26,7 @@ class YamlLoader final : public ParameterSink {
                const char* doc) override;
   void boolean(const char* name, bool& value, const char* doc) override;
   void text(const char* name, std::string& value, const char* doc) override;
-  void choice(const char* name, std::string& value, const Choices& choices,
+  void choice(const char* name, std::string& word, const std::vector<std::string>& choices,
               const char* doc) override;
   void texts(const char* name, std::vector<std::string>& values, const char* doc) override;
   void items(const char* name, ItemList& list, const char* doc) override;

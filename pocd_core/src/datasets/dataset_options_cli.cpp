@@ -5,6 +5,7 @@
 
 #include "../common/parameter_text.hpp"
 #include "pocd/common/check.hpp"
+#include "pocd/common/choice_option.hpp"
 
 namespace pocd {
 namespace {
@@ -76,8 +77,8 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
     add(app.add_option_function<std::string>(flag, take, help));
   };
 
-  add(app.add_option("--dataset", options.format,
-                     "Format of the inputs: torwic, toycar, rgbd, pcd, sim, mcap"))
+  add(add_choice<DatasetFormat, DatasetFormat>(app, "--dataset", options.format,
+                                               "Format of the inputs"))
       ->required();
   add(app.add_option(
           "--input", options.inputs,
@@ -114,8 +115,8 @@ void add_dataset_options(CLI::App& app, DatasetOptions& options) {
         return config_detail::parse_natural(text) ? "" : "\"" + text + "\" is not 0, 1, 2, ...";
       })
       ->capture_default_str();
-  add(app.add_option("--sensor", options.sensor, "Sensor model instead of the scenario's (sim)"))
-      ->check(CLI::IsMember({"perfect", "stereo"}));
+  add(add_choice<SensorKind>(app, "--sensor", options.sensor,
+                             "Sensor model instead of the scenario's (sim)"));
   add(app.add_flag("--as-live", options.as_live,
                    "Only the frames that the component took while they were recorded (mcap)"));
   for (CLI::Option* option : all) option->group("Frames");

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "../common/parameter_text.hpp"
 #include "../sim/yaml_fields.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/datasets/readers.hpp"
@@ -53,13 +54,7 @@ std::unique_ptr<DatasetReader> open_pcd_with_camera_file(DatasetOptions options)
 
 std::unique_ptr<DatasetReader> open_sim(const DatasetOptions& options) {
   Scenario scenario = load_run(options.inputs);
-  if (options.sensor == "perfect") {
-    scenario.sensor = SensorModel::perfect();
-  } else if (options.sensor == "stereo") {
-    scenario.sensor = SensorModel();
-  } else if (!options.sensor.empty()) {
-    throw InputError("sim: sensor '" + options.sensor + "' is unknown, one of: perfect, stereo");
-  }
+  if (options.sensor) scenario.sensor = SensorModel::of(*options.sensor);
   SimReaderOptions reader;
   reader.seed = options.seed;
   reader.label_divisor = options.label_divisor;
@@ -75,14 +70,22 @@ std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options) {
     throw InputError("dataset: frame_rate_hz = " + std::to_string(options.frame_rate_hz) +
                      ", not in (0, 1000]");
   }
-  if (options.format == "torwic") return open_torwic(options);
-  if (options.format == "toycar") return open_toycar(options);
-  if (options.format == "rgbd") return open_rgbd(options);
-  if (options.format == "pcd") return open_pcd_with_camera_file(options);
-  if (options.format == "sim") return open_sim(options);
-  if (options.format == "mcap") return open_recorded(options);
-  throw InputError("dataset: format '" + options.format +
-                   "' is unknown, one of: torwic, toycar, rgbd, pcd, sim, mcap");
+  switch (options.format) {
+    case DatasetFormat::kTorwic:
+      return open_torwic(options);
+    case DatasetFormat::kToycar:
+      return open_toycar(options);
+    case DatasetFormat::kRgbd:
+      return open_rgbd(options);
+    case DatasetFormat::kPcd:
+      return open_pcd_with_camera_file(options);
+    case DatasetFormat::kSim:
+      return open_sim(options);
+    case DatasetFormat::kMcap:
+      return open_recorded(options);
+  }
+  throw InputError("dataset: format " +
+                   config_detail::not_one_of(word_of(options.format), choices_of<DatasetFormat>()));
 }
 
 }  // namespace pocd

@@ -71,10 +71,10 @@ std::vector<std::string> absent_streams(const RobotStreams& robot, const InputCo
     tell(InputStream::kOdometry,
          robot.topic(InputStream::kOdometry) + " and " + robot.topic(InputStream::kTf), true);
   }
-  const bool wants_masks = counts.complete > 0 && input.segmentation == "optional";
+  const bool wants_masks = counts.complete > 0 && input.segmentation == StreamUse::kOptional;
   if ((wants_masks || counts.dropped_no_segmentation > 0) && empty(InputStream::kSegmentation)) {
     tell(InputStream::kSegmentation, robot.topic(InputStream::kSegmentation),
-         input.segmentation == "required");
+         input.segmentation == StreamUse::kRequired);
   }
   return lines;
 }

@@ -6,23 +6,28 @@
 namespace pocd {
 namespace {
 
+EventKind event_kind(ExpectedKind kind) {
+  if (kind == ExpectedKind::kMoved) return EventKind::kMoved;
+  return kind == ExpectedKind::kAdded ? EventKind::kAdded : EventKind::kRemoved;
+}
+
 std::string describe_expected(const ExpectedChange& change) {
   char text[160];
-  if (change.kind == "MOVED") {
+  if (change.kind == ExpectedKind::kMoved) {
     std::snprintf(text, sizeof text, " (%.2f, %.2f) -> (%.2f, %.2f) within %.2f m", change.from_x_m,
                   change.from_y_m, change.x_m, change.y_m, change.within_m);
   } else {
     std::snprintf(text, sizeof text, " (%.2f, %.2f) within %.2f m", change.x_m, change.y_m,
                   change.within_m);
   }
-  return change.kind + (change.class_name.empty() ? "" : " " + change.class_name) + text;
+  return word_of(change.kind) + (change.class_name.empty() ? "" : " " + change.class_name) + text;
 }
 
 bool fulfils(const ReportedEvent& event, const ExpectedChange& change) {
   const auto near = [&](const Eigen::Vector3d& place, double x_m, double y_m) {
     return std::hypot(place.x() - x_m, place.y() - y_m) <= change.within_m;
   };
-  return change.kind == to_string(event.kind) &&
+  return event.kind == event_kind(change.kind) &&
          (change.class_name.empty() || change.class_name == event.class_name) &&
          near(event.position_W, change.x_m, change.y_m) &&
          (event.kind != EventKind::kMoved ||
@@ -46,8 +51,8 @@ std::vector<std::string> disappointments(const ExpectedChanges& expected,
   }
   for (std::size_t i = 0; i < last_word.size(); ++i) {
     const EventKind kind = last_word[i].kind;
-    if (claimed[i] || kind == EventKind::kUpdated || expected.others == "any" ||
-        (expected.others == "added" && kind == EventKind::kAdded)) {
+    if (claimed[i] || kind == EventKind::kUpdated || expected.others == OtherReports::kAny ||
+        (expected.others == OtherReports::kAdded && kind == EventKind::kAdded)) {
       continue;
     }
     lines.push_back("reported and not expected: " + describe(last_word[i]));

@@ -162,7 +162,7 @@ Pose StateTruth::T_W_C() const {
 
 DatasetOptions state_dataset(const StateTruth& truth, const std::filesystem::path& folder) {
   DatasetOptions options;
-  options.format = "pcd";
+  options.format = DatasetFormat::kPcd;
   options.inputs = {folder};
   options.repeat = truth.frames_per_state;
   options.camera = truth.camera.model;

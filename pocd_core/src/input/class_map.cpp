@@ -11,14 +11,6 @@ const ClassInfo* find(const std::vector<ClassInfo>& list, ClassId id) {
   return it == list.end() ? nullptr : &*it;
 }
 
-ClassRole parse_role(const std::string& role) {
-  if (role == "ground") return ClassRole::kGround;
-  if (role == "object") return ClassRole::kObject;
-  if (role == "dynamic") return ClassRole::kDynamic;
-  if (role == "ignore") return ClassRole::kIgnore;
-  return ClassRole::kBackground;
-}
-
 }  // namespace
 
 std::optional<std::array<std::uint8_t, 3>> parse_rgb(const std::string& text) {
@@ -69,7 +61,7 @@ std::vector<std::string> ClassMap::inconsistencies() const {
 ClassRole ClassMap::role(ClassId id) const {
   const ClassInfo* info = find(list, id);
   if (!info && id == kThing) return ClassRole::kObject;
-  return info ? parse_role(info->role) : ClassRole::kBackground;
+  return info ? info->role : ClassRole::kBackground;
 }
 
 int ClassMap::stationarity_class(ClassId id) const {

@@ -37,10 +37,10 @@ void check_robot(const RobotConfig& robot, const InputConfig& input,
     problems.push_back("robots: " + robot.name +
                        " must have both tf_topic and tf_static_topic, or neither");
   }
-  if (!robot.color_topic.empty() && input.color == "absent") {
+  if (!robot.color_topic.empty() && input.color == StreamUse::kAbsent) {
     problems.push_back("robots: " + robot.name + " has a color_topic, but color is absent");
   }
-  if (!robot.segmentation_topic.empty() && input.segmentation == "absent") {
+  if (!robot.segmentation_topic.empty() && input.segmentation == StreamUse::kAbsent) {
     problems.push_back("robots: " + robot.name +
                        " has a segmentation_topic, but segmentation is absent");
   }

@@ -91,8 +91,8 @@ bool has_own_tf(const InputConfig& input, const RobotConfig& robot) {
 InputTopics::InputTopics(const InputConfig& input) {
   std::vector<InputStream> streams{InputStream::kDepth, InputStream::kCameraInfo,
                                    InputStream::kOdometry};
-  if (input.segmentation != "absent") streams.push_back(InputStream::kSegmentation);
-  if (input.color != "absent") streams.push_back(InputStream::kColor);
+  if (input.segmentation != StreamUse::kAbsent) streams.push_back(InputStream::kSegmentation);
+  if (input.color != StreamUse::kAbsent) streams.push_back(InputStream::kColor);
   const std::vector<InputStream> transforms{InputStream::kTf, InputStream::kTfStatic};
   for (const RobotConfig& robot : input.robots) {
     const auto add = [&](InputStream stream) {

@@ -32,15 +32,10 @@ std::string percent(std::uint64_t part, std::size_t all) {
   return text;
 }
 
-StreamUse use_of(const std::string& word) {
-  if (word == "absent") return StreamUse::kAbsent;
-  return word == "required" ? StreamUse::kRequired : StreamUse::kOptional;
-}
-
 SynchronizerConfig synchronizer_config(const InputConfig& input, const RobotConfig& robot) {
   SynchronizerConfig config;
-  config.segmentation = use_of(input.segmentation);
-  config.color = use_of(input.color);
+  config.segmentation = input.segmentation;
+  config.color = input.color;
   config.max_wait_ns = nanoseconds(input.sync_wait_s);
   config.tolerance_ns = nanoseconds(input.stamp_tolerance_s);
   config.extrapolation_ns = nanoseconds(input.extrapolation_s);

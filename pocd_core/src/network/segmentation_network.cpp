@@ -96,14 +96,14 @@ struct SegmentationNetwork::Impl {
     labels(cv::Mat::zeros(config.input_height_px, config.input_width_px, CV_8UC3));
   }
 
-  bool channels_last() const { return config.layout == "nhwc"; }
+  bool channels_last() const { return config.layout == TensorLayout::kNhwc; }
 
   /// CV_32F of the network's layout.
   cv::Mat input_of(const cv::Mat& color) const {
     cv::Mat image;
     cv::resize(color, image, {config.input_width_px, config.input_height_px}, 0, 0,
                cv::INTER_LINEAR);
-    const bool rgb = config.channel_order == "rgb";
+    const bool rgb = config.channel_order == ChannelOrder::kRgb;
     const auto order = [&](const ColourValues& c) {
       return std::array<double, 3>{rgb ? c.red : c.blue, c.green, rgb ? c.blue : c.red};
     };
@@ -209,7 +209,7 @@ struct SegmentationNetwork::Impl {
     } catch (const cv::Exception& e) {
       throw InputError(model.string() + ": OpenCV cannot run the network: " + reason(e));
     }
-    const bool logits = config.output == "logits";
+    const bool logits = config.output == NetworkOutput::kLogits;
     if (logits && output.type() != CV_32F) refuse(output, "real numbers");
     return logits ? from_logits(output, color.size()) : from_class_ids(output, color.size());
   }

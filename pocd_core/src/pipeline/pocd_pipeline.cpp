@@ -56,7 +56,7 @@ std::string masks_ended_text(const Frame& frame, const ClassMap& classes) {
   const auto seconds = MaskWatch::kEnded / 1'000'000'000;
   return (frame.robot.empty() ? "" : frame.robot + ": ") + "no segmentation image for " +
          std::to_string(seconds) + " s: goes on without, " +
-         (classes.without_masks == "things"
+         (classes.without_masks == WithoutMasks::kThings
               ? "with things by geometry"
               : "all pixels are of class " +
                     classes.name(static_cast<ClassId>(classes.default_class)));
@@ -154,7 +154,7 @@ FrameResult PocdPipeline::process_frame(const Frame& frame) {
   if (masks == MaskWatch::Masks::kEnd)
     result.warnings.push_back(masks_ended_text(frame, p.config.classes));
   const bool without = masks == MaskWatch::Masks::kNone || masks == MaskWatch::Masks::kEnd;
-  if (without && p.config.classes.without_masks == "things") take_for_things(p.cloud);
+  if (without && p.config.classes.without_masks == WithoutMasks::kThings) take_for_things(p.cloud);
   p.ignored.mark(p.config.map.max_depth_m, p.pool, p.cloud);
   clock.done("organize");
   Frame placed = frame;  // images are shared, not copied

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 
+#include "../common/parameter_text.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd::recording {
@@ -113,32 +114,46 @@ std::uint32_t crc32_of(const std::uint8_t* data, std::size_t size, std::uint32_t
   return static_cast<std::uint32_t>(value);
 }
 
-void compress(const std::string& compression, int level, const Bytes& in, Bytes& out) {
-  if (compression.empty()) {
-    out = in;
-  } else if (compression == "zstd") {
-    out.resize(ZSTD_compressBound(in.size()));
-    const std::size_t size = ZSTD_compress(out.data(), out.size(), in.data(), in.size(), level);
-    POCD_CHECK(!ZSTD_isError(size));
-    out.resize(size);
-  } else if (compression == "lz4") {
-    out.resize(LZ4F_compressFrameBound(in.size(), nullptr));
-    const std::size_t size =
-        LZ4F_compressFrame(out.data(), out.size(), in.data(), in.size(), nullptr);
-    POCD_CHECK(!LZ4F_isError(size));
-    out.resize(size);
-  } else {
-    throw InputError("compression '" + compression + "' is unknown, one of: none, lz4, zstd");
+std::string mcap_name(ChunkCompression compression) {
+  return compression == ChunkCompression::kNone ? "" : word_of(compression);
+}
+
+std::optional<ChunkCompression> compression_named(const std::string& name) {
+  for (const auto& entry : words_of(ChunkCompression{})) {
+    if (name == mcap_name(entry.first)) return entry.first;
   }
+  return std::nullopt;
+}
+
+void compress(ChunkCompression compression, int level, const Bytes& in, Bytes& out) {
+  std::size_t size = 0;
+  switch (compression) {
+    case ChunkCompression::kNone:
+      out = in;
+      return;
+    case ChunkCompression::kLz4:
+      out.resize(LZ4F_compressFrameBound(in.size(), nullptr));
+      size = LZ4F_compressFrame(out.data(), out.size(), in.data(), in.size(), nullptr);
+      POCD_CHECK(!LZ4F_isError(size));
+      out.resize(size);
+      return;
+    case ChunkCompression::kZstd:
+      out.resize(ZSTD_compressBound(in.size()));
+      size = ZSTD_compress(out.data(), out.size(), in.data(), in.size(), level);
+      POCD_CHECK(!ZSTD_isError(size));
+      out.resize(size);
+      return;
+  }
+  throw InputError("compression " +
+                   config_detail::not_one_of(word_of(compression), choices_of<ChunkCompression>()));
 }
 
 Bytes decompress(const std::string& compression, const std::uint8_t* data, std::size_t size,
                  std::size_t out_size) {
-  if (compression == "zstd") return decompress_zstd(data, size, out_size);
-  if (compression == "lz4") return decompress_lz4(data, size, out_size);
-  if (!compression.empty()) {
-    throw DamagedData(0, "compression '" + compression.substr(0, 32) + "' is unknown");
-  }
+  const std::optional<ChunkCompression> known = compression_named(compression);
+  if (!known) throw DamagedData(0, "compression '" + compression.substr(0, 32) + "' is unknown");
+  if (known == ChunkCompression::kZstd) return decompress_zstd(data, size, out_size);
+  if (known == ChunkCompression::kLz4) return decompress_lz4(data, size, out_size);
   if (size != out_size) {
     throw DamagedData(0, "not compressed, but has " + std::to_string(size) + " bytes where " +
                              std::to_string(out_size) + " are announced");

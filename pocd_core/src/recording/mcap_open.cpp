@@ -144,8 +144,7 @@ bool McapReader::looks_like_chunk(std::uint64_t offset, const std::uint8_t* byte
     const std::uint64_t fixed = 8 + 8 + 8 + 4 + 4 + header.compression.size() + 8;
     return length >= fixed && header.records_size == length - fixed &&
            header.start_ns <= header.end_ns && header.uncompressed_size <= limits_.chunk_bytes &&
-           (header.compression.empty() || header.compression == "lz4" ||
-            header.compression == "zstd");
+           compression_named(header.compression).has_value();
   } catch (const DamagedData&) {
     return false;
   }

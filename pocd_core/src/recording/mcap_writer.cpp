@@ -12,7 +12,7 @@ namespace pocd::recording {
 McapWriter::McapWriter(const std::filesystem::path& path, McapWriterOptions options)
     : options_(std::move(options)) {
   Bytes probe;
-  compress(options_.compression, options_.level, {}, probe);  // refuses an unknown one
+  compress(options_.compression, options_.level, {}, probe);  // refuses what is none
   file_ = std::make_unique<OutputFile>(path);
   Bytes out(kMcapMagic.begin(), kMcapMagic.end());
   Bytes content;
@@ -96,7 +96,7 @@ void McapWriter::flush() {
   header.end_ns = end_ns_;
   header.uncompressed_size = chunk_.size();
   header.uncompressed_crc = crc32_of(chunk_.data(), chunk_.size());
-  header.compression = options_.compression;
+  header.compression = mcap_name(options_.compression);
   Bytes records;
   compress(options_.compression, options_.level, chunk_, records);
   header.records_size = records.size();
@@ -109,7 +109,7 @@ void McapWriter::flush() {
   chunk_index.end_ns = end_ns_;
   chunk_index.chunk_offset = file_->size();
   chunk_index.chunk_length = out.size();
-  chunk_index.compression = options_.compression;
+  chunk_index.compression = header.compression;
   chunk_index.compressed_size = records.size();
   chunk_index.uncompressed_size = chunk_.size();
   std::uint64_t messages = 0;

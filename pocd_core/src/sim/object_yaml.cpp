@@ -10,23 +10,6 @@ namespace {
 
 constexpr double kDegree = M_PI / 180.0;
 
-Shape to_shape(YamlFields& fields) {
-  const std::string word = fields.text("shape", "box");
-  if (word == "box") return Shape::kBox;
-  if (word == "cylinder") return Shape::kCylinder;
-  fields.fail("shape", "must be box or cylinder, is '" + word + "'");
-}
-
-Texture to_texture(YamlFields& fields) {
-  const std::string word = fields.text("texture", "plain");
-  if (word == "plain") return Texture::kPlain;
-  if (word == "cardboard") return Texture::kCardboard;
-  if (word == "tarp") return Texture::kTarp;
-  if (word == "concrete") return Texture::kConcrete;
-  if (word == "wood") return Texture::kWood;
-  fields.fail("texture", "must be plain, cardboard, tarp, concrete or wood, is '" + word + "'");
-}
-
 /// Shape, size and looks; the base of the part at `base` in the object's frame.
 ScenePart to_part(YamlFields& fields, const Eigen::Vector3d& base, double yaw_rad,
                   MeshFiles& meshes) {
@@ -38,11 +21,11 @@ ScenePart to_part(YamlFields& fields, const Eigen::Vector3d& base, double yaw_ra
     part.mesh = meshes.get(fields.text("mesh"), scale, fields.where());
     part.size_m = part.mesh->size_m();
   } else {
-    part.shape = to_shape(fields);
+    part.shape = fields.choice("shape", Shape::kBox);
     part.size_m = fields.numbers("size", 3);
   }
   if (fields.has("rgb")) part.rgb = fields.numbers("rgb", 3);
-  part.texture = to_texture(fields);
+  part.texture = fields.choice("texture", Texture::kPlain);
   part.T_O_P = upright_pose(base + Eigen::Vector3d(0, 0, 0.5 * part.size_m.z()), yaw_rad);
   return part;
 }
@@ -110,7 +93,8 @@ std::shared_ptr<const TriangleMesh> MeshFiles::get(const std::string& name, doub
                                                    const std::string& where) {
   const std::filesystem::path file = find(name);
   if (file.empty()) {
-    throw InputError(where + ": key 'mesh': no file '" + name + "' beside the scenario or its bases");
+    throw InputError(where + ": key 'mesh': no file '" + name +
+                     "' beside the scenario or its bases");
   }
   std::shared_ptr<const TriangleMesh>& mesh = read_[{file, scale}];
   if (!mesh) mesh = load_obj(file, scale);

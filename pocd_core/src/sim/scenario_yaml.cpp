@@ -160,8 +160,7 @@ Pose to_mount(YamlFields& fields) {
 SensorModel to_sensor(const YAML::Node& node, const MeshFiles& files, const std::string& where) {
   if (!node.IsScalar()) return sensor_of(node, where);
   const std::string word = node.Scalar();
-  if (word == "perfect") return SensorModel::perfect();
-  if (word == "stereo") return SensorModel();
+  if (const auto kind = value_of<SensorKind>(word)) return SensorModel::of(*kind);
   const std::filesystem::path file = files.find(word);
   if (!file.empty() && file.extension() == ".yaml") return load_sensor(file);
   throw InputError(where + " must be perfect, stereo, a YAML file or a map, is '" + word + "'");

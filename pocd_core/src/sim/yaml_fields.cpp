@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "../common/parameter_text.hpp"
 #include "pocd/common/check.hpp"
 
 namespace pocd {
@@ -89,6 +90,11 @@ void YamlFields::finish() const {
 
 void YamlFields::fail(const std::string& key, const std::string& what) const {
   throw InputError(where_ + ": key '" + key + "' " + what);
+}
+
+void YamlFields::no_choice(const std::string& key, const std::string& word,
+                           const std::vector<std::string>& choices) const {
+  fail(key, config_detail::not_one_of(word, choices));
 }
 
 Eigen::VectorXd number_list(const YAML::Node& node, int count, const std::string& where) {

@@ -5,8 +5,12 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
+#include <vector>
+
+#include "pocd/common/enum_words.hpp"
 
 namespace pocd {
 
@@ -34,6 +38,14 @@ class YamlFields {
   std::string text(const std::string& key, const std::string& otherwise) {
     return has(key) ? text(key) : otherwise;
   }
+  /// A word of an enum.
+  template <class Enum>
+  Enum choice(const std::string& key, Enum otherwise) {
+    const std::string word = text(key, word_of(otherwise));
+    const std::optional<Enum> value = value_of<Enum>(word);
+    if (!value) no_choice(key, word, choices_of<Enum>());
+    return *value;
+  }
   /// A list of exactly `count` finite numbers.
   Eigen::VectorXd numbers(const std::string& key, int count);
 
@@ -42,6 +54,9 @@ class YamlFields {
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
 
  private:
+  [[noreturn]] void no_choice(const std::string& key, const std::string& word,
+                              const std::vector<std::string>& choices) const;
+
   YAML::Node map_, fallback_;
   std::string where_;
   std::set<std::string> known_;

@@ -9,6 +9,9 @@
 namespace pocd {
 namespace {
 
+enum class Mode { kFast, kSlow };
+EnumWords<Mode> words_of(Mode) { return {{Mode::kFast, "fast"}, {Mode::kSlow, "slow"}}; }
+
 struct Item {
   int id = 0;
   template <class Visitor>
@@ -20,17 +23,17 @@ struct Item {
 struct Group {
   double length_m = 1.0;
   std::uint64_t seed = 1;
-  std::string mode = "fast";
+  Mode mode = Mode::kFast;
   std::vector<Item> list;
   std::vector<std::string> inconsistencies() const {
-    if (mode == "fast" && seed == 3) return {"seed: 3 is slow"};
+    if (mode == Mode::kFast && seed == 3) return {"seed: 3 is slow"};
     return {};
   }
   template <class Visitor>
   void describe(Visitor& visit) {
     visit("length_m", length_m, Range{0.5, 2.0}, "A length [m].");
     visit("seed", seed, Range{1, 5}, "A seed.");
-    visit("mode", mode, Choices{{"fast", "slow"}}, "How.");
+    visit("mode", mode, "How.");
     visit("list", list, "Items.");
   }
 };
@@ -65,8 +68,8 @@ TEST(CheckParameters, FieldValueAndWhatIsAllowedAreNamed) {
   sample.group.seed = 6;
   EXPECT_EQ(problem_of(sample), "sample: group.seed: 6 is out of range, allowed are 1 to 5");
   sample = {};
-  sample.group.mode = "fsat";
-  EXPECT_EQ(problem_of(sample), "sample: group.mode: \"fsat\" is not one of: fast, slow");
+  sample.group.mode = static_cast<Mode>(7);
+  EXPECT_EQ(problem_of(sample), "sample: group.mode: \"7\" is not one of: fast, slow");
   sample = {};
   sample.group.list = {{1}, {10}};
   EXPECT_EQ(problem_of(sample), "sample: group.list[1].id: 10 is out of range, allowed are 0 to 9");
@@ -78,10 +81,10 @@ TEST(CheckParameters, FieldValueAndWhatIsAllowedAreNamed) {
 TEST(CheckParameters, AllProblemsAreSaidAtOnce) {
   Sample sample;
   sample.group.length_m = 0.0;
-  sample.group.mode = "";
+  sample.group.mode = static_cast<Mode>(-1);
   EXPECT_EQ(
       problem_of(sample),
-      "sample: group.length_m: 0 is out of range, allowed are 0.5 to 2 m; group.mode: \"\" is "
+      "sample: group.length_m: 0 is out of range, allowed are 0.5 to 2 m; group.mode: \"-1\" is "
       "not one of: fast, slow");
 }
 

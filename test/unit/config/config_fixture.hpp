@@ -14,6 +14,9 @@
 
 namespace pocd {
 
+enum class Word { kRed, kGreen };
+inline EnumWords<Word> words_of(Word) { return {{Word::kRed, "red"}, {Word::kGreen, "green"}}; }
+
 /// Every kind of parameter that a describe() can have.
 struct AllKinds {
   double real = 0.5;
@@ -22,7 +25,7 @@ struct AllKinds {
   std::uint64_t natural = 7;
   bool flag = false;
   std::string text = "plain";
-  std::string word = "red";
+  Word word = Word::kRed;
   std::vector<std::string> texts{"a", "b"};
   std::vector<ClassInfo> items;
   DepthNoise noise;
@@ -40,7 +43,7 @@ struct AllKinds {
     visit("natural", natural, Range{0, 1.9e19}, "A natural number.");
     visit("flag", flag, "A switch.");
     visit("text", text, "Any text.");
-    visit("word", word, Choices{{"red", "green"}}, "One of | two words.");
+    visit("word", word, "One of | two words.");
     visit("texts", texts, "Some texts.");
     visit("items", items, "Some structs.");
     visit.group("noise", noise, "A group.");

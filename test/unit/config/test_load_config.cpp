@@ -33,12 +33,12 @@ TEST(LoadConfig, ReadsEveryKind) {
   EXPECT_EQ(c.natural, 18446744073709551615ull);
   EXPECT_TRUE(c.flag);
   EXPECT_EQ(c.text, "two words");
-  EXPECT_EQ(c.word, "green");
+  EXPECT_EQ(c.word, Word::kGreen);
   EXPECT_EQ(c.texts, std::vector<std::string>{"x"});
   ASSERT_EQ(c.items.size(), 1u);
   EXPECT_EQ(c.items[0].id, 4);
   EXPECT_EQ(c.items[0].name, "fence");
-  EXPECT_EQ(c.items[0].role, "background");  // default of an entry's field that is not given
+  EXPECT_EQ(c.items[0].role, ClassRole::kBackground);  // default of an entry's field that is not given
   EXPECT_EQ(c.noise.base_m, 0.02);
   EXPECT_EQ(c.noise.quadratic_per_m, DepthNoise{}.quadratic_per_m);
 }

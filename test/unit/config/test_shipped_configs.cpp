@@ -40,7 +40,7 @@ TEST_P(ShippedConfig, HasAnObjectClassIfItListsClasses) {
   const ClassMap classes = load_shipped(GetParam()).classes;
   if (classes.list.empty()) GTEST_SKIP() << "an overlay without classes";
   EXPECT_TRUE(std::any_of(classes.list.begin(), classes.list.end(),
-                          [](const ClassInfo& c) { return c.role == "object"; }));
+                          [](const ClassInfo& c) { return c.role == ClassRole::kObject; }));
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, ShippedConfig, testing::ValuesIn(shipped_files()),

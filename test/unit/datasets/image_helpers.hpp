@@ -37,8 +37,8 @@ inline std::vector<Frame> read_all(DatasetReader& reader) {
   return frames;
 }
 
-inline DatasetOptions dataset_options(const std::string& format,
-                                      const std::filesystem::path& folder, double frame_rate_hz) {
+inline DatasetOptions dataset_options(DatasetFormat format, const std::filesystem::path& folder,
+                                      double frame_rate_hz) {
   DatasetOptions options;
   options.format = format;
   options.inputs = {folder};

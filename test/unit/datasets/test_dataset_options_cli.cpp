@@ -18,7 +18,7 @@ DatasetOptions parse(const std::string& arguments) {
 TEST(DatasetOptionsCli, DefaultsAreThoseOfTheStruct) {
   const DatasetOptions parsed = parse("--dataset rgbd --input a");
   const DatasetOptions defaults;
-  EXPECT_EQ(parsed.format, "rgbd");
+  EXPECT_EQ(parsed.format, DatasetFormat::kRgbd);
   EXPECT_EQ(parsed.inputs, std::vector<std::filesystem::path>{"a"});
   EXPECT_EQ(parsed.repeat, defaults.repeat);
   EXPECT_EQ(parsed.frame_rate_hz, defaults.frame_rate_hz);
@@ -38,11 +38,16 @@ TEST(DatasetOptionsCli, ReadsAllFlags) {
   EXPECT_NEAR(parsed.gravity_W.value().norm(), 1.0, 1e-12);  // rounding of one division
   EXPECT_NEAR(parsed.gravity_W.value().y(), 0.90443, 1e-4);  // the text's digits
   EXPECT_EQ(parsed.camera.value(), (CameraModel{640, 480, 525, 525, 319.5, 239.5}));
-  EXPECT_EQ(parsed.sensor, "perfect");
+  EXPECT_EQ(parsed.sensor, SensorKind::kPerfect);
   EXPECT_EQ(parsed.T_W_C.value().translation(), Eigen::Vector3d(0.1, -0.5, 2));
   // Half the angle has sine 0.6: the x axis turns to (cos, sin) = (0.28, 0.96). Rounding only.
   EXPECT_TRUE(parsed.T_W_C.value().linear().col(0).isApprox(Eigen::Vector3d(0.28, 0.96, 0), 1e-12));
   EXPECT_EQ(parsed.extrinsics.value().T_B_C.translation(), Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(DatasetOptionsCli, RefusesWordsThatAreNoChoice) {
+  EXPECT_THROW(parse("--dataset rosbag --input a"), CLI::ValidationError);
+  EXPECT_THROW(parse("--dataset sim --input a --sensor lidar"), CLI::ValidationError);
 }
 
 // Without quotes YAML would take it for a group of keys.

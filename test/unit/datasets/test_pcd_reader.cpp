@@ -35,7 +35,7 @@ const std::vector<int> kLabels = {1, 0, 9, 10, 21, 35, 1, 1};
 
 DatasetOptions options_for(const ScratchFolder& folder) {
   DatasetOptions options;
-  options.format = "pcd";
+  options.format = DatasetFormat::kPcd;
   options.inputs = {folder.path()};
   options.camera = CameraModel{kWidth, kHeight, 10, 10, 3.5, 2.5};
   options.T_W_C = Pose::Identity();
@@ -219,7 +219,7 @@ TEST(PcdReader, ReadsTheTable) {
   const std::filesystem::path table = std::filesystem::path(POCD_TEST_DATA) / "tabletop_states";
   if (!std::filesystem::exists(table)) GTEST_SKIP() << table << " is not there";
   DatasetOptions options;
-  options.format = "pcd";
+  options.format = DatasetFormat::kPcd;
   options.inputs = {table};
   options.camera = CameraModel{640, 480, 525, 525, 319.5, 239.5};
   Pose T_W_C = Pose::Identity();

@@ -26,7 +26,7 @@ void make_sequence(const ScratchFolder& folder, int count) {
 }
 
 DatasetOptions options_for(const ScratchFolder& folder) {
-  return dataset_options("rgbd", folder.path(), 10.0);
+  return dataset_options(DatasetFormat::kRgbd, folder.path(), 10.0);
 }
 
 TEST(RgbdReader, ReadsFrames) {
@@ -174,7 +174,7 @@ TEST(RgbdReader, ReadsTheKitchen) {
   const std::filesystem::path kitchen = std::filesystem::path(POCD_TEST_DATA) / "redkitchen";
   if (!std::filesystem::exists(kitchen)) GTEST_SKIP() << kitchen << " is not there";
   DatasetOptions options;
-  options.format = "rgbd";
+  options.format = DatasetFormat::kRgbd;
   options.inputs = {kitchen};
   const auto reader = open_dataset(options);
   EXPECT_EQ(reader->size(), 300u);

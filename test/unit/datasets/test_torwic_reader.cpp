@@ -32,7 +32,7 @@ void make_sequence(const ScratchFolder& folder) {
 }
 
 DatasetOptions options_for(const ScratchFolder& folder) {
-  DatasetOptions options = dataset_options("torwic", folder.path(), 15.0);
+  DatasetOptions options = dataset_options(DatasetFormat::kTorwic, folder.path(), 15.0);
   options.camera = kSmall;
   return options;
 }
@@ -107,7 +107,7 @@ TEST(TorwicReader, FoldersThatCannotBeReadAreNamed) {
   options.inputs = {folder / "Segmentation"};
   EXPECT_NE(open_error(options).find("Segmentation: cannot be read: "), std::string::npos)
       << open_error(options);
-  options.format = "mcap";
+  options.format = DatasetFormat::kMcap;
   EXPECT_NE(open_error(options).find("Segmentation: cannot be read: "), std::string::npos)
       << open_error(options);
 }
@@ -134,7 +134,7 @@ TEST(TorwicReader, ReadsWhatTheWriterWrote) {
     for (std::size_t i = 0; i < 3; ++i) writer.write(simulated.frame(i));
   }
   DatasetOptions options;
-  options.format = "torwic";
+  options.format = DatasetFormat::kTorwic;
   options.inputs = {folder.path()};
   const auto reader = open_dataset(options);
   const std::vector<Frame> frames = read_all(*reader);

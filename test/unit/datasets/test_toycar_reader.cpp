@@ -38,7 +38,7 @@ void make_sequence(const ScratchFolder& folder, const char* depth = "depth_noise
 }
 
 DatasetOptions options_for(const ScratchFolder& folder) {
-  return dataset_options("toycar", folder.path(), 10.0);
+  return dataset_options(DatasetFormat::kToycar, folder.path(), 10.0);
 }
 
 TEST(ToycarReader, ReadsFrames) {

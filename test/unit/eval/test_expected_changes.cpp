@@ -20,7 +20,7 @@ ReportedEvent moved(std::uint32_t object, double from_x, double x) {
   return reported;
 }
 
-ExpectedChange expect(const std::string& kind, double x, double from_x = 0.0) {
+ExpectedChange expect(ExpectedKind kind, double x, double from_x = 0.0) {
   ExpectedChange change;
   change.kind = kind;
   change.x_m = x;
@@ -33,24 +33,25 @@ TEST(ExpectedChanges, EachIsFulfilledByAnEventOfItsOwn) {
       event(EventKind::kAdded, 1, 1.0, 0.0), event(EventKind::kUpdated, 1, 1.0, 0.0),
       event(EventKind::kRemoved, 2, 5.1, 0.0), moved(3, 7.0, 8.0)};
   ExpectedChanges expected;
-  expected.changes = {expect("REMOVED", 5.0), expect("MOVED", 8.2, 7.2), expect("ADDED", 1.2)};
-  expected.others = "none";
+  expected.changes = {expect(ExpectedKind::kRemoved, 5.0), expect(ExpectedKind::kMoved, 8.2, 7.2),
+                      expect(ExpectedKind::kAdded, 1.2)};
+  expected.others = OtherReports::kNone;
   EXPECT_TRUE(disappointments(expected, events).empty());
-  expected.changes.push_back(expect("REMOVED", 5.0));
+  expected.changes.push_back(expect(ExpectedKind::kRemoved, 5.0));
   EXPECT_EQ(disappointments(expected, events).size(), 1u) << "one event is not two";
 }
 
 TEST(ExpectedChanges, PlaceKindAndClassHaveToFit) {
   const std::vector<ReportedEvent> events{moved(3, 7.0, 8.0)};
   ExpectedChanges expected;
-  expected.others = "any";
-  expected.changes = {expect("MOVED", 8.0, 5.0)};
+  expected.others = OtherReports::kAny;
+  expected.changes = {expect(ExpectedKind::kMoved, 8.0, 5.0)};
   EXPECT_EQ(disappointments(expected, events).size(), 1u) << "from elsewhere";
-  expected.changes = {expect("MOVED", 9.0, 7.0)};
+  expected.changes = {expect(ExpectedKind::kMoved, 9.0, 7.0)};
   EXPECT_EQ(disappointments(expected, events).size(), 1u) << "to elsewhere";
-  expected.changes = {expect("ADDED", 8.0)};
+  expected.changes = {expect(ExpectedKind::kAdded, 8.0)};
   EXPECT_EQ(disappointments(expected, events).size(), 1u);
-  expected.changes = {expect("MOVED", 8.0, 7.0)};
+  expected.changes = {expect(ExpectedKind::kMoved, 8.0, 7.0)};
   expected.changes[0].class_name = "fence";
   EXPECT_EQ(
       disappointments(expected, events),
@@ -62,12 +63,12 @@ TEST(ExpectedChanges, OthersAreAllowedAsTheFileSays) {
   const std::vector<ReportedEvent> events{event(EventKind::kAdded, 1, 1.0, 0.0),
                                           event(EventKind::kRemoved, 2, 5.0, 0.0)};
   ExpectedChanges expected;
-  expected.others = "any";
+  expected.others = OtherReports::kAny;
   EXPECT_EQ(disappointments(expected, events).size(), 0u);
-  expected.others = "added";
+  expected.others = OtherReports::kAdded;
   EXPECT_EQ(disappointments(expected, events),
             std::vector<std::string>{"reported and not expected: REMOVED box #2 (5.00, 0.00)"});
-  expected.others = "none";
+  expected.others = OtherReports::kNone;
   EXPECT_EQ(disappointments(expected, events).size(), 2u);
 }
 
@@ -75,8 +76,8 @@ TEST(ExpectedChanges, WhatAMoveTakesBackIsNotReported) {
   const std::vector<ReportedEvent> events{event(EventKind::kRemoved, 3, 7.0, 0.0),
                                           moved(3, 7.0, 8.0)};
   ExpectedChanges expected;
-  expected.others = "none";
-  expected.changes = {expect("MOVED", 8.0, 7.0)};
+  expected.others = OtherReports::kNone;
+  expected.changes = {expect(ExpectedKind::kMoved, 8.0, 7.0)};
   EXPECT_TRUE(disappointments(expected, events).empty());
 }
 

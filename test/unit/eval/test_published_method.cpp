@@ -219,6 +219,8 @@ TEST(PublishedMethod, ShippedFilesHoldThePublishedParameters) {
   EXPECT_EQ(torwic.delta_max_m, 4.0);
   EXPECT_EQ(torwic.tau_m, 0.20);
   EXPECT_EQ(torwic.remove_below, 0.4);
+  // Without a file, the method has the parameters of the warehouse.
+  EXPECT_EQ(dump_config(torwic), dump_config(PublishedConfig()));
   const PublishedConfig toycar = load("published_toycar.yaml");
   EXPECT_EQ(toycar.lambda_diff, 1.8);
   EXPECT_EQ(toycar.delta_max_m, 0.6);

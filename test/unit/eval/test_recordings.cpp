@@ -38,7 +38,7 @@ TEST(Recordings, NothingIsRemovedOrMovedInAStillKitchen) {
   PipelineConfig config;
   load_config(config, {kSource / "config/redkitchen.yaml"});
   DatasetOptions options;
-  options.format = "rgbd";
+  options.format = DatasetFormat::kRgbd;
   options.inputs = {folder};
   options.gravity_W = Eigen::Vector3d(-0.00887, 0.90443, 0.42654).normalized();
   const auto reader = open_dataset(options);

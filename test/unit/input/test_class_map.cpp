@@ -18,25 +18,6 @@ TEST(ClassMap, UnlistedClassesAreStaticBackground) {
   EXPECT_EQ(map.name(test::kBoxClass), "box");
 }
 
-TEST(ClassMap, EveryRoleHasItsName) {
-  ClassMap map;
-  const std::vector<std::pair<std::string, ClassRole>> roles = {
-      {"background", ClassRole::kBackground},
-      {"ground", ClassRole::kGround},
-      {"object", ClassRole::kObject},
-      {"dynamic", ClassRole::kDynamic},
-      {"ignore", ClassRole::kIgnore}};
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    ClassInfo info;
-    info.id = static_cast<int>(i);
-    info.role = roles[i].first;
-    map.list.push_back(info);
-  }
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    EXPECT_EQ(map.role(static_cast<ClassId>(i)), roles[i].second) << roles[i].first;
-  }
-}
-
 TEST(ClassMap, NamesEveryBrokenRule) {
   ClassMap map = test::room_classes();
   EXPECT_TRUE(map.inconsistencies().empty());

@@ -183,9 +183,9 @@ TEST(DepthImage, DamagedCompressionIsNamedAndNeverReadBeyond) {
 
 ClassMap coloured_classes() {
   ClassMap map;
-  map.list = {{0, "none", "background", 1, "0,0,0"},
-              {7, "box", "object", 0, "0,153,153"},
-              {300, "far", "background", 1, "255,0,102"}};
+  map.list = {{0, "none", ClassRole::kBackground, 1, "0,0,0"},
+              {7, "box", ClassRole::kObject, 0, "0,153,153"},
+              {300, "far", ClassRole::kBackground, 1, "255,0,102"}};
   return map;
 }
 

@@ -15,7 +15,7 @@ constexpr StampNs kStart = 1'700'000'000'000 * kMs;  // a wall clock
 
 ClassMap classes() {
   ClassMap map;
-  map.list = {{1, "floor", "ground", 1, ""}, {7, "box", "object", 0, ""}};
+  map.list = {{1, "floor", ClassRole::kGround, 1, ""}, {7, "box", ClassRole::kObject, 0, ""}};
   map.default_class = 5;
   return map;
 }
@@ -24,7 +24,7 @@ ClassMap classes() {
 class RobotStreamsTest : public ::testing::Test {
  protected:
   RobotStreamsTest() {
-    input_.segmentation = "optional";
+    input_.segmentation = StreamUse::kOptional;
     robot_.name = "r";
   }
 

@@ -101,7 +101,7 @@ TEST_F(SameRun, WhateverFramesItIsStoppedAt) {
     const ScratchFolder folder;
     PipelineConfig config = circuit_config();
     if (seed % 2 == 0) {  // with regions that go to disk besides
-      config.map.memory.limit = "budget";
+      config.map.memory.limit = MapLimit::kBudget;
       config.map.memory.budget_mb = 4;
       config.map.memory.folder = folder.path().string();
     }

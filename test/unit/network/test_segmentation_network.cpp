@@ -5,6 +5,7 @@
 #include <fstream>
 #include <opencv2/core.hpp>
 
+#include "every_choice.hpp"
 #include "pocd/common/check.hpp"
 #include "pocd/config/config_io.hpp"
 #include "pocd/network/network_config.hpp"
@@ -19,10 +20,10 @@ constexpr int kWidth = 6, kHeight = 4;
 
 ClassMap classes() {
   ClassMap map;
-  map.list = {{0, "other", "background", 1, ""},
-              {3, "red_thing", "object", 0, ""},
-              {5, "green_thing", "object", 0, ""},
-              {9, "blue_thing", "object", 0, ""}};
+  map.list = {{0, "other", ClassRole::kBackground, 1, ""},
+              {3, "red_thing", ClassRole::kObject, 0, ""},
+              {5, "green_thing", ClassRole::kObject, 0, ""},
+              {9, "blue_thing", ClassRole::kObject, 0, ""}};
   return map;
 }
 
@@ -190,6 +191,12 @@ TEST_F(Network, MistakesInTheFileAreNamed) {
   expect_refusal({"input_height_px", "0"});
   describe("  channel_order: gbr\n");
   expect_refusal({file(), "channel_order", "gbr"});
+}
+
+TEST(NetworkChoices, AreChecked) {
+  EXPECT_EQ(
+      test::try_every_choice<NetworkFile>(),
+      (std::vector<std::string>{"network.channel_order", "network.layout", "network.output"}));
 }
 
 class Frames : public DatasetReader {

@@ -38,23 +38,24 @@ TEST(PipelineConfigFromCpp, IsCheckedFieldByField) {
             std::string::npos);
 }
 
-// A word with a mistake would be taken for another one.
-TEST(PipelineConfigFromCpp, WordsAreOnesThatThereAre) {
+// A number that is no value of an enum would be taken for one.
+TEST(PipelineConfigFromCpp, ChoicesAreOnesThatThereAre) {
   EXPECT_NE(refusal([](PipelineConfig& c) {
-              c.classes.without_masks = "thing";
-            }).find("classes.without_masks: \"thing\" is not one of: things, default_class"),
+              c.classes.without_masks = static_cast<WithoutMasks>(2);
+            }).find("classes.without_masks: \"2\" is not one of: things, default_class"),
             std::string::npos);
   EXPECT_NE(refusal([](PipelineConfig& c) {
-              c.classes.list = {{4, "box", "objekt", 0}};
-            }).find("classes.list[0].role: \"objekt\" is not one of: "),
+              c.classes.list = {{4, "box", static_cast<ClassRole>(5), 0}};
+            }).find("classes.list[0].role: \"5\" is not one of: "),
             std::string::npos);
 }
 
 TEST(PipelineConfigFromCpp, RulesBetweenFieldsHold) {
-  EXPECT_NE(refusal([](PipelineConfig& c) {
-              c.classes.list = {{4, "box", "object", 0}, {4, "bin", "object", 0}};
-            }).find("classes: list[1].id: 4 is that of list[0]"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal([](PipelineConfig& c) {
+        c.classes.list = {{4, "box", ClassRole::kObject, 0}, {4, "bin", ClassRole::kObject, 0}};
+      }).find("classes: list[1].id: 4 is that of list[0]"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ TEST(PipelineThings, ARemovalAndAnArrivalAreTold) {
 
 TEST(PipelineThings, TheDefaultClassIsStillToBeHad) {
   PipelineConfig config = test::room_config();
-  config.classes.without_masks = "default_class";
+  config.classes.without_masks = WithoutMasks::kDefaultClass;
   config.classes.default_class = test::kWallClass;
   Drive drive(config);
   watch(drive, room_with({left(), right()}), 20);
@@ -107,7 +107,7 @@ TEST_F(MasksEnd, ItGoesOnWithThingsByGeometryAndSaysSo) {
 
 TEST_F(MasksEnd, ItMapsTheConfiguredClassAndSaysSo) {
   PipelineConfig config = test::room_config();
-  config.classes.without_masks = "default_class";
+  config.classes.without_masks = WithoutMasks::kDefaultClass;
   config.classes.default_class = test::kWallClass;
   Drive drive(config);
   know(drive);

@@ -8,11 +8,11 @@
 namespace pocd::recording {
 namespace {
 
-class Compression : public testing::TestWithParam<const char*> {};
+class Compression : public testing::TestWithParam<ChunkCompression> {};
 
-std::string error_of(const std::string& compression, const Bytes& data, std::size_t announced) {
+std::string error_of(ChunkCompression compression, const Bytes& data, std::size_t announced) {
   try {
-    decompress(compression, data.data(), data.size(), announced);
+    decompress(mcap_name(compression), data.data(), data.size(), announced);
   } catch (const DamagedData& damage) {
     return damage.what();
   }
@@ -27,7 +27,8 @@ TEST_P(Compression, GivesBackWhatItTook) {
   for (const Bytes& bytes : {Bytes{}, Bytes{1}, noise, Bytes(20'000'000, 0)}) {
     Bytes small;
     compress(GetParam(), 1, bytes, small);
-    EXPECT_TRUE(decompress(GetParam(), small.data(), small.size(), bytes.size()) == bytes);
+    EXPECT_TRUE(decompress(mcap_name(GetParam()), small.data(), small.size(), bytes.size()) ==
+                bytes);
     EXPECT_NE(error_of(GetParam(), small, bytes.size() + 1), "") << bytes.size();
     if (bytes.empty()) continue;
     EXPECT_NE(error_of(GetParam(), small, bytes.size() - 1), "") << bytes.size();
@@ -45,7 +46,8 @@ TEST_P(Compression, GarbageThatAnnouncesMuchCostsNothing) {
   EXPECT_NE(error_of(GetParam(), small, std::size_t{1} << 62), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, Compression, testing::Values("zstd", "lz4"));
+INSTANTIATE_TEST_SUITE_P(Each, Compression,
+                         testing::Values(ChunkCompression::kZstd, ChunkCompression::kLz4));
 
 }  // namespace
 }  // namespace pocd::recording

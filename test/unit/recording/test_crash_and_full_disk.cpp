@@ -64,7 +64,7 @@ TEST(KilledRecorder, LeavesAReadableFile) {
 int write_until_full(const std::filesystem::path& file, std::size_t chunk_bytes) {
   McapWriterOptions options;
   options.chunk_bytes = chunk_bytes;
-  options.compression = "";
+  options.compression = ChunkCompression::kNone;
   McapWriter writer(file, options);
   const auto channel = writer.add_channel(0, "/a", "cdr", {});
   const Bytes data(500, 7);
@@ -132,7 +132,7 @@ TEST(SplitWriter, SplitsBySizeAndTime) {
     const std::string name = by_size ? "size" : "time";
     SplitOptions options;
     options.mcap.chunk_bytes = 2000;
-    options.mcap.compression = "";
+    options.mcap.compression = ChunkCompression::kNone;
     (by_size ? options.most_bytes : options.most_duration_ns) = by_size ? 20'000 : 100;
     SplitWriter writer(folder / (name + ".mcap"), options);
     const auto schema = writer.add_schema("a", "ros2msg", "uint8 a\n");
@@ -170,7 +170,7 @@ TEST(SplitWriter, EveryFileBeginsWithTheHead) {
   SplitOptions options;
   options.most_bytes = 5'000;
   options.mcap.chunk_bytes = 500;
-  options.mcap.compression = "";
+  options.mcap.compression = ChunkCompression::kNone;
   EXPECT_TRUE(SplitWriter::existing(folder / "run.mcap", options).empty());
   SplitWriter writer(folder / "run.mcap", options);
   const auto schema = writer.add_schema("a", "ros2msg", "uint8 a\n");
@@ -199,7 +199,7 @@ TEST(SplitWriter, ARingNamesWhatItCannotRemoveAndGoesOn) {
   const TemporaryFolder folder;
   SplitOptions options;
   options.mcap.chunk_bytes = 500;
-  options.mcap.compression = "";
+  options.mcap.compression = ChunkCompression::kNone;
   options.most_bytes = 5'000;
   options.keep_bytes = 15'000;
   std::filesystem::create_directories(folder / "run_0000.mcap" / "full");  // no file of a recorder
@@ -220,7 +220,7 @@ TEST(SplitWriter, ARingKeepsTheLatestAlsoOverRuns) {
   const TemporaryFolder folder;
   SplitOptions options;
   options.mcap.chunk_bytes = 500;
-  options.mcap.compression = "";
+  options.mcap.compression = ChunkCompression::kNone;
   options.most_bytes = 5'000;
   options.keep_bytes = 30'000;
   std::ofstream(folder / "run_notes.mcap") << "not of the ring";

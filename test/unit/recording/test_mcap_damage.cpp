@@ -17,7 +17,7 @@ struct Sample {
   std::vector<std::size_t> chunk_offsets;
 };
 
-Sample make_sample(const std::string& compression) {
+Sample make_sample(ChunkCompression compression) {
   const TemporaryFolder folder;
   McapWriterOptions options;
   options.compression = compression;
@@ -66,7 +66,7 @@ std::size_t messages_before(const Sample& sample, std::size_t offset) {
   return count;
 }
 
-class McapDamage : public testing::TestWithParam<const char*> {};
+class McapDamage : public testing::TestWithParam<ChunkCompression> {};
 
 TEST_P(McapDamage, CutAnywhereReadsUpToTheLastWholeChunk) {
   const Sample sample = make_sample(GetParam());
@@ -131,11 +131,8 @@ TEST_P(McapDamage, ManyFlippedBytesNeverCrash) {
     }
   }
 }
-INSTANTIATE_TEST_SUITE_P(Compressions, McapDamage, testing::Values("", "lz4", "zstd"),
-                         [](const auto& info) {
-                           return *info.param == '\0' ? std::string("none")
-                                                      : std::string(info.param);
-                         });
+INSTANTIATE_TEST_SUITE_P(Compressions, McapDamage, testing::ValuesIn(kCompressions),
+                         [](const auto& info) { return word_of(info.param); });
 
 void put(Bytes& bytes, std::size_t at, std::uint64_t value) {
   for (int i = 0; i < 8; ++i) bytes[at + i] = static_cast<std::uint8_t>(value >> (8 * i));
@@ -146,7 +143,7 @@ std::string first_problem(const McapReader& reader) {
 }
 
 TEST(McapDefects, WrongMagic) {
-  Sample sample = make_sample("zstd");
+  Sample sample = make_sample(ChunkCompression::kZstd);
   sample.bytes[3] = 'X';
   McapReader reader = read_memory(sample.bytes);
   EXPECT_TRUE(read_all(reader) == sample.kept);
@@ -156,7 +153,7 @@ TEST(McapDefects, WrongMagic) {
 }
 
 TEST(McapDefects, MissingFooter) {
-  Sample sample = make_sample("zstd");
+  Sample sample = make_sample(ChunkCompression::kZstd);
   sample.bytes.resize(sample.bytes.size() - kFooterBytes - kMcapMagic.size());
   McapReader reader = read_memory(sample.bytes);
   EXPECT_TRUE(read_all(reader) == sample.kept);
@@ -168,7 +165,7 @@ TEST(McapDefects, MissingFooter) {
 TEST(McapDefects, AbsurdLengths) {
   for (const std::uint64_t length :
        {std::uint64_t{0}, std::uint64_t{1} << 20, std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
-    Sample sample = make_sample("zstd");
+    Sample sample = make_sample(ChunkCompression::kZstd);
     put(sample.bytes, sample.chunk_offsets[2] + 1, length);  // of the record
     sample.bytes.resize(sample.bytes.size() - 1);            // and no footer
     McapReader reader = read_memory(sample.bytes);
@@ -181,7 +178,7 @@ TEST(McapDefects, AbsurdLengths) {
       return p.find(where) != std::string::npos;
     })) << where;
   }
-  Sample sample = make_sample("zstd");
+  Sample sample = make_sample(ChunkCompression::kZstd);
   put(sample.bytes, sample.chunk_offsets[2] + 9 + 16, ~std::uint64_t{0});  // uncompressed size
   McapReader reader = read_memory(sample.bytes);
   EXPECT_GT(read_all(reader).size(), sample.kept.size() - 30);
@@ -189,7 +186,7 @@ TEST(McapDefects, AbsurdLengths) {
 }
 
 TEST(McapDefects, UnknownCompression) {
-  Sample sample = make_sample("zstd");
+  Sample sample = make_sample(ChunkCompression::kZstd);
   sample.bytes[sample.chunk_offsets[1] + 9 + 8 + 8 + 8 + 4 + 4] = 'q';
   McapReader reader = read_memory(sample.bytes);
   EXPECT_GT(read_all(reader).size(), sample.kept.size() - 30);

@@ -56,7 +56,7 @@ void write_a(const std::filesystem::path& file, StampNs begin = kBegin, bool mou
 template <class Rename>
 void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
              const Rename& rename, const std::string& encoding = "cdr",
-             const std::string& compression = "") {
+             ChunkCompression compression = ChunkCompression::kNone) {
   const auto reader = open_recording(from);
   McapWriter writer(to);
   std::vector<std::uint16_t> channels;
@@ -96,7 +96,7 @@ TEST(OtherRecordings, FilesOfOtherKindsSayWhatTheyAre) {
 TEST(OtherRecordings, CompressionOfOthersIsNamedByMetadataAndMessages) {
   const TemporaryFolder folder;
   write_a(folder / "plain.mcap");
-  rewrite(folder / "plain.mcap", folder / "x_0.mcap", same, "cdr", "lz4");
+  rewrite(folder / "plain.mcap", folder / "x_0.mcap", same, "cdr", ChunkCompression::kLz4);
   const std::string list = "rosbag2_bagfile_information:\n  relative_file_paths: [x_0.mcap]\n";
   write_file(folder / "metadata.yaml", list +
                                            "  compression_mode: MESSAGE\n"
@@ -118,7 +118,7 @@ TEST(OtherRecordings, MetadataFindsItsFilesPackedAndUnpacked) {
   write_a(folder / "plain.mcap");
   const Bytes plain = file_bytes(folder / "plain.mcap");
   Bytes packed;
-  compress("zstd", 1, plain, packed);
+  compress(ChunkCompression::kZstd, 1, plain, packed);
   const auto metadata = folder / "metadata.yaml";
   write_file(folder / "x_0.mcap.zstd", packed);
   write_file(metadata, "rosbag2_bagfile_information:\n  relative_file_paths: [bag/x_0.mcap]\n");

@@ -211,7 +211,8 @@ TEST(RecordedRobots, CompressedMessagesAndFilesAreUnpacked) {
     RecordedMessage message;
     while (reader->next(message)) {
       Bytes packed;
-      compress("zstd", 1, Bytes(message.data, message.data + message.size), packed);
+      compress(ChunkCompression::kZstd, 1, Bytes(message.data, message.data + message.size),
+               packed);
       if (message.log_time_ns / 10 % 2 == 1) packed = as_stream(message.data, message.size);
       writer.write({channels[message.channel], 0, message.log_time_ns, 0}, packed.data(),
                    packed.size());
@@ -220,7 +221,7 @@ TEST(RecordedRobots, CompressedMessagesAndFilesAreUnpacked) {
   }
   {
     Bytes packed;
-    compress("zstd", 1, file_bytes(plain), packed);
+    compress(ChunkCompression::kZstd, 1, file_bytes(plain), packed);
     std::ofstream(whole, std::ios::binary)
         .write(reinterpret_cast<const char*>(packed.data()),
                static_cast<std::streamsize>(packed.size()));

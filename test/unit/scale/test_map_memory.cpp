@@ -19,7 +19,7 @@ namespace {
 
 TsdfConfig limited(const TsdfConfig& config, const ScratchFolder& folder, int budget_mb) {
   TsdfConfig result = config;
-  result.memory.limit = "budget";
+  result.memory.limit = MapLimit::kBudget;
   result.memory.budget_mb = budget_mb;
   result.memory.folder = folder.path().string();
   return result;

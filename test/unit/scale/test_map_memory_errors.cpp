@@ -19,7 +19,7 @@ namespace {
 
 TsdfConfig limited(const std::string& folder) {
   TsdfConfig config = coarse_config();
-  config.memory.limit = "budget";
+  config.memory.limit = MapLimit::kBudget;
   config.memory.budget_mb = 3;
   config.memory.folder = folder;
   return config;

@@ -49,7 +49,7 @@ TEST(Things, AreMovableAndHonestAboutTheirClass) {
   EXPECT_EQ(classes.stationarity_class(kThing), 0);
   EXPECT_EQ(classes.name(kThing), "thing");
   ClassMap own = classes;
-  own.list.push_back({kThing, "void", "ignore", 1, ""});
+  own.list.push_back({kThing, "void", ClassRole::kIgnore, 1, ""});
   EXPECT_EQ(own.name(kThing), "void") << "a class that is listed goes before";
   EXPECT_EQ(own.role(kThing), ClassRole::kIgnore);
 }

@@ -9,8 +9,8 @@
 
 namespace pocd {
 
-/// Collects what show_parameters() finds wrong: values outside their range, words that are no
-/// choice, broken rules between fields. Changes nothing.
+/// Collects what show_parameters() finds wrong: values outside their range, numbers that are no
+/// value of their enum, broken rules between fields. Changes nothing.
 class ParameterCheck final : public ParameterSink {
  public:
   void real(const char* name, double& value, const Range& range, const char* doc) override;
@@ -19,7 +19,7 @@ class ParameterCheck final : public ParameterSink {
                const char* doc) override;
   void boolean(const char*, bool&, const char*) override {}
   void text(const char*, std::string&, const char*) override {}
-  void choice(const char* name, std::string& value, const Choices& choices,
+  void choice(const char* name, std::string& word, const std::vector<std::string>& choices,
               const char* doc) override;
   void texts(const char*, std::vector<std::string>&, const char*) override {}
   void items(const char* name, ItemList& list, const char* doc) override;

@@ -11,12 +11,12 @@
 //   };
 //
 // A Visitor has operator() for: double, int, std::uint64_t with a Range; bool; std::string;
-// std::string with Choices; std::vector of structs or strings; and group(name, nested, doc) for a
-// nested struct. Visitors live in src/config (strict YAML load, dump, Markdown page).
+// an enum that has words (enum_words.hpp); std::vector of structs or strings; and group(name,
+// nested, doc) for a nested struct. Visitors live in src/config (strict YAML load, dump, Markdown
+// page).
 #pragma once
 
-#include <string>
-#include <vector>
+#include "pocd/common/enum_words.hpp"
 
 namespace pocd {
 
@@ -24,11 +24,6 @@ namespace pocd {
 struct Range {
   double low;
   double high;
-};
-
-/// Allowed words of a string parameter.
-struct Choices {
-  std::vector<std::string> words;
 };
 
 }  // namespace pocd

@@ -38,7 +38,8 @@ class ParameterSink {
                        const char* doc) = 0;
   virtual void boolean(const char* name, bool& value, const char* doc) = 0;
   virtual void text(const char* name, std::string& value, const char* doc) = 0;
-  virtual void choice(const char* name, std::string& value, const Choices& choices,
+  /// `word` is that of an enum's value; another one of `choices` sets it.
+  virtual void choice(const char* name, std::string& word, const std::vector<std::string>& choices,
                       const char* doc) = 0;
   virtual void texts(const char* name, std::vector<std::string>& values, const char* doc) = 0;
   virtual void items(const char* name, ItemList& list, const char* doc) = 0;
@@ -73,8 +74,11 @@ class DescribeAdapter {
   void operator()(const char* name, std::string& value, const char* doc) {
     sink_.text(name, value, doc);
   }
-  void operator()(const char* name, std::string& value, const Choices& choices, const char* doc) {
-    sink_.choice(name, value, choices, doc);
+  template <class Enum, class = std::enable_if_t<std::is_enum_v<Enum>>>
+  void operator()(const char* name, Enum& value, const char* doc) {
+    std::string word = word_of(value);
+    sink_.choice(name, word, choices_of<Enum>(), doc);
+    value = value_of<Enum>(word).value_or(value);
   }
   void operator()(const char* name, std::vector<std::string>& values, const char* doc) {
     sink_.texts(name, values, doc);

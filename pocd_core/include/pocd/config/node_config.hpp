@@ -28,6 +28,15 @@ struct GridExtentConfig {
   std::vector<std::string> inconsistencies() const;
 };
 
+/// Form of the messages whose types differ between releases of ROS 2.
+enum class RosRelease {
+  kHumble,  ///< humble
+  kIron,    ///< iron and all later ones
+};
+inline EnumWords<RosRelease> words_of(RosRelease) {
+  return {{RosRelease::kHumble, "humble"}, {RosRelease::kIron, "iron"}};
+}
+
 /// Rates of the topics for others; 0 switches one off.
 struct RosOutputConfig {
   double markers_hz = 1.0;
@@ -46,7 +55,7 @@ struct RosOutputConfig {
   double rate_mb_s = 10.0;
   std::string topic_namespace = "pocd";
   std::string level_name = "L1";
-  std::string ros_release = "iron";
+  RosRelease ros_release = RosRelease::kIron;
   std::string ros_node = "";
 
   template <class Visitor>
@@ -90,7 +99,7 @@ struct RosOutputConfig {
           "Takes the place of pocd in the names of these topics, but for rt/rmf_obstacles and "
           "rt/diagnostics, which several nodes may share.");
     visit("level_name", level_name, "Level of the building that the obstacles are on (Open-RMF).");
-    visit("ros_release", ros_release, Choices{{"humble", "iron"}},
+    visit("ros_release", ros_release,
           "Release of ROS 2 that messages have the form of where releases differ: humble, or iron "
           "and all later ones (jazzy, kilted, rolling). rt/rmf_obstacles has no header in humble, "
           "and ros_discovery_info has longer numbers.");

@@ -11,11 +11,27 @@
 #include "pocd/input/class_map.hpp"
 #include "pocd/input/dataset_reader.hpp"
 #include "pocd/input/input_config.hpp"
+#include "pocd/sim/sensor_model.hpp"
 
 namespace pocd {
 
+/// Layouts are described at the readers (readers.hpp).
+enum class DatasetFormat {
+  kTorwic,  ///< folders of TorWIC mapping
+  kToycar,  ///< folders of Co-Fusion's synthetic sequences
+  kRgbd,    ///< folders of 7-Scenes
+  kPcd,     ///< folders of labelled, organised PCD files
+  kSim,     ///< scenario files of the simulator
+  kMcap,    ///< recordings of the bus
+};
+inline EnumWords<DatasetFormat> words_of(DatasetFormat) {
+  return {{DatasetFormat::kTorwic, "torwic"}, {DatasetFormat::kToycar, "toycar"},
+          {DatasetFormat::kRgbd, "rgbd"},     {DatasetFormat::kPcd, "pcd"},
+          {DatasetFormat::kSim, "sim"},       {DatasetFormat::kMcap, "mcap"}};
+}
+
 struct DatasetOptions {
-  std::string format;  ///< "torwic", "toycar", "rgbd", "pcd", "sim", "mcap"
+  DatasetFormat format = DatasetFormat::kMcap;
   /// Visited in order as one run; stamps are shifted to go on. Folders, or scenario files for
   /// "sim".
   std::vector<std::filesystem::path> inputs;
@@ -34,8 +50,8 @@ struct DatasetOptions {
   /// Labels are class * label_divisor + instance for sources that know instances (pcd, sim); 1:
   /// class.
   int label_divisor = 1;
-  std::string sensor;      ///< sim: "" as the scenario says, or "perfect", "stereo"
-  bool with_color = true;  ///< sim: colour images cost time
+  std::optional<SensorKind> sensor;  ///< sim: instead of the scenario's
+  bool with_color = true;            ///< sim: colour images cost time
   /// mcap: robots, topics, and how frames are put together, as on the bus.
   InputConfig input;
   /// mcap: classes of the masks.
@@ -47,7 +63,7 @@ struct DatasetOptions {
   bool as_live = false;
 };
 
-/// Throws InputError: unknown format (listing the known ones), missing or empty folder, unreadable
+/// Throws InputError: missing or empty folder, unreadable
 /// intrinsics; the text names the path. Part of the configuration library (pocd::config), since the
 /// simulator's scenarios and a PCD sequence's camera are YAML.
 std::unique_ptr<DatasetReader> open_dataset(const DatasetOptions& options);

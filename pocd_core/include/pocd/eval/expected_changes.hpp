@@ -9,9 +9,27 @@
 
 namespace pocd {
 
+enum class ExpectedKind { kAdded, kMoved, kRemoved };
+inline EnumWords<ExpectedKind> words_of(ExpectedKind) {
+  return {{ExpectedKind::kAdded, "ADDED"},
+          {ExpectedKind::kMoved, "MOVED"},
+          {ExpectedKind::kRemoved, "REMOVED"}};
+}
+
+/// What may be reported beside what is expected.
+enum class OtherReports {
+  kAny,    ///< anything
+  kAdded,  ///< ADDED: what stood there from the start
+  kNone,   ///< nothing
+};
+inline EnumWords<OtherReports> words_of(OtherReports) {
+  return {
+      {OtherReports::kAny, "any"}, {OtherReports::kAdded, "added"}, {OtherReports::kNone, "none"}};
+}
+
 /// One report that has to come. Places are of the box, on the ground, map frame.
 struct ExpectedChange {
-  std::string kind = "ADDED";
+  ExpectedKind kind = ExpectedKind::kAdded;
   std::string class_name;
   double x_m = 0.0, y_m = 0.0;
   double from_x_m = 0.0, from_y_m = 0.0;  ///< MOVED only
@@ -19,7 +37,7 @@ struct ExpectedChange {
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("kind", kind, Choices{{"ADDED", "MOVED", "REMOVED"}}, "What is reported.");
+    visit("kind", kind, "What is reported.");
     visit("class_name", class_name, "Of the object; empty: any.");
     visit("x_m", x_m, Range{-100'000, 100'000}, "Where it is now, REMOVED: was [m].");
     visit("y_m", y_m, Range{-100'000, 100'000}, "Where it is now, REMOVED: was [m].");
@@ -32,12 +50,12 @@ struct ExpectedChange {
 /// The file of pocd_expect.
 struct ExpectedChanges {
   std::vector<ExpectedChange> changes;
-  std::string others = "added";
+  OtherReports others = OtherReports::kAdded;
 
   template <class Visitor>
   void describe(Visitor& visit) {
     visit("changes", changes, "What has to be reported, each by an event of its own.");
-    visit("others", others, Choices{{"any", "added", "none"}},
+    visit("others", others,
           "What else may be reported: anything, only ADDED (what stood there from the start), or "
           "nothing.");
   }

@@ -13,11 +13,30 @@
 
 namespace pocd {
 
-/// background: mapped, never an object (walls, shelving bolted down, ceiling).
-/// ground: mapped, removed before clustering. object: tracked with a belief.
-/// dynamic: moves by itself (people, trucks): neither mapped nor tracked. ignore: pixels not used
-/// at all (the robot's own body).
-enum class ClassRole { kBackground, kGround, kObject, kDynamic, kIgnore };
+/// What the pipeline does with the pixels of a class.
+enum class ClassRole {
+  kBackground,  ///< mapped, never an object (walls, shelving bolted down, ceiling)
+  kGround,      ///< mapped, removed before clustering
+  kObject,      ///< tracked with a belief
+  kDynamic,     ///< moves by itself (people, trucks): neither mapped nor tracked
+  kIgnore,      ///< not used at all (the robot's own body)
+};
+inline EnumWords<ClassRole> words_of(ClassRole) {
+  return {{ClassRole::kBackground, "background"},
+          {ClassRole::kGround, "ground"},
+          {ClassRole::kObject, "object"},
+          {ClassRole::kDynamic, "dynamic"},
+          {ClassRole::kIgnore, "ignore"}};
+}
+
+/// What a robot sees that never sends masks.
+enum class WithoutMasks {
+  kThings,        ///< what geometry tells to be movable is a thing (kThing)
+  kDefaultClass,  ///< every pixel has the default class
+};
+inline EnumWords<WithoutMasks> words_of(WithoutMasks) {
+  return {{WithoutMasks::kThings, "things"}, {WithoutMasks::kDefaultClass, "default_class"}};
+}
 
 /// Class of what geometry alone tells to be a thing, seen by a robot that sends no masks: movable,
 /// named "thing".
@@ -29,7 +48,7 @@ std::optional<std::array<std::uint8_t, 3>> parse_rgb(const std::string& text);
 struct ClassInfo {
   int id = 0;
   std::string name;
-  std::string role = "background";
+  ClassRole role = ClassRole::kBackground;
   int stationarity_class = 1;  ///< s: 0 dynamic/movable, 1 static
   std::string rgb = "";        ///< colour of the class in rgb8 masks, "r,g,b"; empty: none
 
@@ -37,8 +56,7 @@ struct ClassInfo {
   void describe(Visitor& visit) {
     visit("id", id, Range{0, 65535}, "Class index in mono8 and mono16 segmentation images.");
     visit("name", name, "Name in outputs.");
-    visit("role", role, Choices{{"background", "ground", "object", "dynamic", "ignore"}},
-          "What the pipeline does with its pixels.");
+    visit("role", role, "What the pipeline does with its pixels.");
     visit("stationarity_class", stationarity_class, Range{0, 1}, "s: 0 movable, 1 static.");
     visit("rgb", rgb, "Colour in rgb8/bgr8 segmentation images as \"r,g,b\"; empty for none.");
   }
@@ -47,8 +65,7 @@ struct ClassInfo {
 struct ClassMap {
   /// Class of every pixel of a frame that has no segmentation image.
   int default_class = 0;
-  /// What a robot sees that never sends masks: "things" by geometry, or all "default_class".
-  std::string without_masks = "things";
+  WithoutMasks without_masks = WithoutMasks::kThings;
   /// Pixel value = class * label_divisor + instance; 1: the value is the class.
   int label_divisor = 1;
   std::vector<ClassInfo> list;
@@ -69,7 +86,7 @@ struct ClassMap {
   void describe(Visitor& visit) {
     visit("default_class", default_class, Range{0, 65535},
           "Class of all pixels when no segmentation image is there.");
-    visit("without_masks", without_masks, Choices{{"things", "default_class"}},
+    visit("without_masks", without_masks,
           "Of a robot that never sends masks: what geometry tells to be movable is a thing (class "
           "65535), or every pixel has the default class.");
     visit("label_divisor", label_divisor, Range{1, 65535},

@@ -20,6 +20,18 @@ inline constexpr char kTf[] = "rt/tf";
 inline constexpr char kTfStatic[] = "rt/tf_static";
 }  // namespace input_names
 
+/// What is done with a stream of images.
+enum class StreamUse {
+  kAbsent,    ///< not looked at
+  kOptional,  ///< waited for, then gone on without
+  kRequired,  ///< waited for, then the frame is dropped
+};
+inline EnumWords<StreamUse> words_of(StreamUse) {
+  return {{StreamUse::kAbsent, "absent"},
+          {StreamUse::kOptional, "optional"},
+          {StreamUse::kRequired, "required"}};
+}
+
 /// Where the camera sits when no tf_static says so.
 struct MountConfig {
   bool given = false;
@@ -106,8 +118,8 @@ struct InputConfig {
   std::vector<RobotConfig> robots;
   bool discover_robots = false;
   TopicPatterns topics;
-  std::string segmentation = "optional";
-  std::string color = "absent";
+  StreamUse segmentation = StreamUse::kOptional;
+  StreamUse color = StreamUse::kAbsent;
   std::string map_frame = "map";
   double sync_wait_s = 0.3;
   double stamp_tolerance_s = 0.01;
@@ -127,9 +139,9 @@ struct InputConfig {
                 "Names of the input topics on the bus; {robot} is the name. A ROS name (/a) means "
                 "rt/a. A topic that ends in /compressed or /compressedDepth is read as "
                 "sensor_msgs/CompressedImage.");
-    visit("segmentation", segmentation, Choices{{"absent", "optional", "required"}},
+    visit("segmentation", segmentation,
           "Segmentation images: not looked at, waited for and gone on without, or necessary.");
-    visit("color", color, Choices{{"absent", "optional", "required"}}, "The same for colour.");
+    visit("color", color, "The same for colour.");
     visit("map_frame", map_frame, "Frame of the map: root of the poses.");
     visit("sync_wait_s", sync_wait_s, Range{0.0, 60.0},
           "How far newer data may run ahead of an incomplete frame [s of data time].");
@@ -156,8 +168,8 @@ struct InputConfig {
 
   /// Masks come from a network that sees the colour images: those of the robots are not looked at.
   void use_color_alone() {
-    segmentation = "absent";
-    color = "required";
+    segmentation = StreamUse::kAbsent;
+    color = StreamUse::kRequired;
   }
 
   /// Robots are found by their topics.

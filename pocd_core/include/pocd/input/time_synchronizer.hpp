@@ -14,14 +14,11 @@
 
 #include "pocd/common/types.hpp"
 #include "pocd/input/camera_model.hpp"
+#include "pocd/input/input_config.hpp"
 #include "pocd/input/stamp_order.hpp"
 #include "pocd/input/transform_tree.hpp"
 
 namespace pocd {
-
-/// kAbsent: not looked at. kOptional: waited for, then gone on without. kRequired: waited for, then
-/// the frame is dropped.
-enum class StreamUse { kAbsent, kOptional, kRequired };
 
 /// How long a frame waits for what it lacks of one stream. kBounded: until newer data of the robot
 /// is `max_wait_ns` ahead; kEndless (a replay without loss): however far other streams run ahead;

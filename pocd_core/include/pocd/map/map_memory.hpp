@@ -8,17 +8,26 @@
 
 namespace pocd {
 
+/// Where voxels are.
+enum class MapLimit {
+  kNone,    ///< in memory
+  kBudget,  ///< in memory up to a budget; beyond it, the least recently seen ones go to disk
+};
+inline EnumWords<MapLimit> words_of(MapLimit) {
+  return {{MapLimit::kNone, "none"}, {MapLimit::kBudget, "budget"}};
+}
+
 struct MapMemoryConfig {
-  std::string limit = "none";
+  MapLimit limit = MapLimit::kNone;
   int budget_mb = 1024;
   std::string folder = "/var/tmp";
 
-  bool limited() const { return limit == "budget"; }
+  bool limited() const { return limit == MapLimit::kBudget; }
   std::uint64_t budget_bytes() const { return static_cast<std::uint64_t>(budget_mb) << 20; }
 
   template <class Visitor>
   void describe(Visitor& visit) {
-    visit("limit", limit, Choices{{"none", "budget"}},
+    visit("limit", limit,
           "Voxels stay in memory, or the least recently seen ones go to disk and come back when "
           "they are seen again. The map is the same, bit by bit.");
     visit("budget_mb", budget_mb, Range{1, 1000000},

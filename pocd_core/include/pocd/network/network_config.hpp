@@ -20,14 +20,40 @@ struct ColourValues {
   }
 };
 
+/// Order of the channels of the input.
+enum class ChannelOrder {
+  kRgb,  ///< red first
+  kBgr,  ///< blue first
+};
+inline EnumWords<ChannelOrder> words_of(ChannelOrder) {
+  return {{ChannelOrder::kRgb, "rgb"}, {ChannelOrder::kBgr, "bgr"}};
+}
+
+/// Order of the dimensions of input and output.
+enum class TensorLayout {
+  kNchw,  ///< channels before rows
+  kNhwc,  ///< channels after columns
+};
+inline EnumWords<TensorLayout> words_of(TensorLayout) {
+  return {{TensorLayout::kNchw, "nchw"}, {TensorLayout::kNhwc, "nhwc"}};
+}
+
+enum class NetworkOutput {
+  kLogits,    ///< one plane per class, of which the largest value counts
+  kClassIds,  ///< one plane of class numbers
+};
+inline EnumWords<NetworkOutput> words_of(NetworkOutput) {
+  return {{NetworkOutput::kLogits, "logits"}, {NetworkOutput::kClassIds, "class_ids"}};
+}
+
 struct NetworkConfig {
   int input_width_px = 0;
   int input_height_px = 0;
-  std::string channel_order = "rgb";
-  std::string layout = "nchw";
+  ChannelOrder channel_order = ChannelOrder::kRgb;
+  TensorLayout layout = TensorLayout::kNchw;
   ColourValues mean;
   ColourValues scale{1.0 / 255, 1.0 / 255, 1.0 / 255};
-  std::string output = "logits";
+  NetworkOutput output = NetworkOutput::kLogits;
   std::vector<std::string> classes;
 
   template <class Visitor>
@@ -36,13 +62,12 @@ struct NetworkConfig {
           "Width that an image is stretched to; must be given [pixels].");
     visit("input_height_px", input_height_px, Range{0, 4096},
           "Height that an image is stretched to; must be given [pixels].");
-    visit("channel_order", channel_order, Choices{{"rgb", "bgr"}},
-          "Order of the channels of the input.");
-    visit("layout", layout, Choices{{"nchw", "nhwc"}},
+    visit("channel_order", channel_order, "Order of the channels of the input.");
+    visit("layout", layout,
           "Order of the dimensions of input and output: channels before rows, or after columns.");
     visit.group("mean", mean, "Subtracted from each pixel's 0 to 255.");
     visit.group("scale", scale, "What that is multiplied by.");
-    visit("output", output, Choices{{"logits", "class_ids"}},
+    visit("output", output,
           "One plane per class, of which the largest value counts, or one plane of class numbers.");
     visit(
         "classes", classes,

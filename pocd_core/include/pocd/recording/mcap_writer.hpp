@@ -4,14 +4,26 @@
 #include <filesystem>
 #include <memory>
 
+#include "pocd/common/enum_words.hpp"
 #include "pocd/recording/mcap_records.hpp"
 
 namespace pocd::recording {
 
 class OutputFile;
 
+enum class ChunkCompression {
+  kNone,
+  kLz4,   ///< frame format
+  kZstd,  ///< with a level
+};
+inline EnumWords<ChunkCompression> words_of(ChunkCompression) {
+  return {{ChunkCompression::kNone, "none"},
+          {ChunkCompression::kLz4, "lz4"},
+          {ChunkCompression::kZstd, "zstd"}};
+}
+
 struct McapWriterOptions {
-  std::string compression = "zstd";    ///< "", "lz4" or "zstd"
+  ChunkCompression compression = ChunkCompression::kZstd;
   int level = 1;                       ///< zstd's; 1 keeps up with cameras on one core
   std::size_t chunk_bytes = 4u << 20;  ///< a chunk is written when it holds that much
 };
@@ -20,7 +32,7 @@ struct McapWriterOptions {
 /// whatever happens to the process, all chunks before it can be read. Not thread-safe.
 class McapWriter {
  public:
-  /// Throws InputError: the file cannot be created, or an unknown compression.
+  /// Throws InputError: the file cannot be created, or no such compression.
   explicit McapWriter(const std::filesystem::path& path, McapWriterOptions options = {});
   /// Closes; errors are lost, so call close().
   ~McapWriter();

@@ -1,5 +1,6 @@
-// The simulated world: solid boxes, upright cylinders and triangle meshes, grouped to objects. Depth
-// seen by a camera is exact, so that tests and evaluation have a truth that no sampling blurs.
+// The simulated world: solid boxes, upright cylinders and triangle meshes, grouped to objects.
+// Depth seen by a camera is exact, so that tests and evaluation have a truth that no sampling
+// blurs.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "pocd/common/enum_words.hpp"
 #include "pocd/common/types.hpp"
 
 namespace pocd {
@@ -14,9 +16,20 @@ namespace pocd {
 class TriangleMesh;
 
 enum class Shape { kBox, kCylinder, kMesh };
+/// Those of a file without a mesh.
+inline EnumWords<Shape> words_of(Shape) {
+  return {{Shape::kBox, "box"}, {Shape::kCylinder, "cylinder"}};
+}
 
 /// How a surface is painted in the colour image; no effect on depth or labels.
 enum class Texture { kPlain, kCardboard, kTarp, kConcrete, kWood };
+inline EnumWords<Texture> words_of(Texture) {
+  return {{Texture::kPlain, "plain"},
+          {Texture::kCardboard, "cardboard"},
+          {Texture::kTarp, "tarp"},
+          {Texture::kConcrete, "concrete"},
+          {Texture::kWood, "wood"}};
+}
 
 /// One solid. Its frame P has the origin at the centre of the solid.
 /// kBox: edges size_m along x, y, z. kCylinder: axis along z, diameter size_m.x, height size_m.z.

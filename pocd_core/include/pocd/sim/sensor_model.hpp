@@ -10,6 +10,15 @@
 
 namespace pocd {
 
+/// Sensors that have a name.
+enum class SensorKind {
+  kPerfect,  ///< SensorModel::perfect()
+  kStereo,   ///< the defaults of SensorModel
+};
+inline EnumWords<SensorKind> words_of(SensorKind) {
+  return {{SensorKind::kPerfect, "perfect"}, {SensorKind::kStereo, "stereo"}};
+}
+
 /// Works on images alone, whatever made them. Every effect can be switched off by its own field
 /// (0), and those of borders and far ranges are off unless asked for. The same seed and frame
 /// number give the same errors, whatever was rendered before.
@@ -49,6 +58,9 @@ struct SensorModel {
 
   /// Exact depth, labels and poses; no range limit.
   static SensorModel perfect();
+  static SensorModel of(SensorKind kind) {
+    return kind == SensorKind::kPerfect ? perfect() : SensorModel();
+  }
 
   template <class Visitor>
   void describe(Visitor& visit) {
