@@ -38,7 +38,7 @@ TEST(LoadConfig, ReadsEveryKind) {
   ASSERT_EQ(c.items.size(), 1u);
   EXPECT_EQ(c.items[0].id, 4);
   EXPECT_EQ(c.items[0].name, "fence");
-  EXPECT_EQ(c.items[0].role, ClassRole::kBackground);  // default of an entry's field that is not given
+  EXPECT_EQ(c.items[0].role, ClassRole::kBackground);  // not given: the default
   EXPECT_EQ(c.noise.base_m, 0.02);
   EXPECT_EQ(c.noise.quadratic_per_m, DepthNoise{}.quadratic_per_m);
 }
