@@ -129,6 +129,7 @@ main(async () => {
   const component = node("--lossless", "--set", "node.outputs.markers_hz=5");
   const viewers = [await connect(server.address, "foxglove.websocket.v1"), await connect(server.address, "foxglove.sdk.v1")];
   for (const { seen } of viewers) await until(() => seen.channels.length > 8, "channels are advertised");
+  await recorder.says(/recording \S*pocd\/object_events/); // what was written before is gone for it
   const player = play("test/integration/data/two_drives.yaml", "--lossless", "--fast");
   check((await player.ended) === 0, "the player ended in order");
   const wanted = ["/pocd/objects", "/pocd/object_events", "/pocd/health", "/pocd/status", "/pocd/objects/markers", "/pocd/map", "/pocd/surface", "/diagnostics", "/rmf_obstacles", "/tf_static"];

@@ -17,6 +17,7 @@ main(async () => {
   const recorder = new Program("pocd_record", ["--output", recording, "--overwrite"]);
   await recorder.says(/topics|waits|records/i);
   const component = node("--robot", "robot1", "--robot", "robot2", "--lossless", "--set", `node.memory.folder=${memory}`);
+  await recorder.says(/recording \S*pocd\/object_events/); // what was written before is gone for it
   const player = play("config/sim/demo.yaml", "--lossless", "--fast");
   check((await player.ended) === 0, "the player ended in order");
   check((await component.end()) === 0, "the component ended in order");
