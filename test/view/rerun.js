@@ -62,7 +62,7 @@ main(async () => {
   const recorder = new Program("pocd_record", ["--output", recording, "--overwrite", "--rerun", "--topic", "/pocd/*", "--topic", "/tf*", "--topic", "/*/odom", "--topic", "/*/depth/camera_info"]);
   await recorder.says(/recording on domain/);
   const component = node("--lossless", "--set", "node.outputs.markers_hz=5", "--set", "node.outputs.occupancy_whole_s=0.5");
-  await recorder.says(/recording \S*pocd\/object_events/); // what was written before is gone for it
+  await recorder.says(/recording \S*objects\/markers/); // what was written before is gone for it
   const player = play("test/integration/data/two_drives.yaml", "--lossless", "--speed", "4");
   check((await player.ended) === 0, "the player ended in order");
   check((await component.end()) === 0, "the component ended in order");
