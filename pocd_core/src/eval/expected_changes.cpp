@@ -6,14 +6,9 @@
 namespace pocd {
 namespace {
 
-EventKind event_kind(ExpectedKind kind) {
-  if (kind == ExpectedKind::kMoved) return EventKind::kMoved;
-  return kind == ExpectedKind::kAdded ? EventKind::kAdded : EventKind::kRemoved;
-}
-
 std::string describe_expected(const ExpectedChange& change) {
   char text[160];
-  if (change.kind == ExpectedKind::kMoved) {
+  if (change.kind == EventKind::kMoved) {
     std::snprintf(text, sizeof text, " (%.2f, %.2f) -> (%.2f, %.2f) within %.2f m", change.from_x_m,
                   change.from_y_m, change.x_m, change.y_m, change.within_m);
   } else {
@@ -27,7 +22,7 @@ bool fulfils(const ReportedEvent& event, const ExpectedChange& change) {
   const auto near = [&](const Eigen::Vector3d& place, double x_m, double y_m) {
     return std::hypot(place.x() - x_m, place.y() - y_m) <= change.within_m;
   };
-  return event.kind == event_kind(change.kind) &&
+  return event.kind == change.kind &&
          (change.class_name.empty() || change.class_name == event.class_name) &&
          near(event.position_W, change.x_m, change.y_m) &&
          (event.kind != EventKind::kMoved ||

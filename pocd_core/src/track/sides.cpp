@@ -88,9 +88,9 @@ bool ObjectTracker::sides_of_one(Step& step, const LibraryObject& a, const Libra
             [](const Line& l, const Line& r) { return l.length_m < r.length_m; });
   lines.resize((lines.size() + 1) / 2);
   if (lines.front().length_m > reach_m) return false;
-  const auto less = static_cast<double>((a_less ? a : b).model.surfels().size());
-  const auto more = static_cast<double>((a_less ? b : a).model.surfels().size());
-  const bool fragment = a.class_id != kThing && less <= kFragmentShare * more &&
+  const auto smaller = static_cast<double>((a_less ? a : b).model.surfels().size());
+  const auto larger = static_cast<double>((a_less ? b : a).model.surfels().size());
+  const bool fragment = a.class_id != kThing && smaller <= kFragmentShare * larger &&
                         lines.front().length_m < kFragmentContacts * contact_m();
   const auto cell_m = static_cast<float>(2.0 * config_.map.voxel_size_m);
   std::size_t crossing = 0;

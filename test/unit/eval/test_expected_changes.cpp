@@ -20,7 +20,7 @@ ReportedEvent moved(std::uint32_t object, double from_x, double x) {
   return reported;
 }
 
-ExpectedChange expect(ExpectedKind kind, double x, double from_x = 0.0) {
+ExpectedChange expect(EventKind kind, double x, double from_x = 0.0) {
   ExpectedChange change;
   change.kind = kind;
   change.x_m = x;
@@ -33,11 +33,11 @@ TEST(ExpectedChanges, EachIsFulfilledByAnEventOfItsOwn) {
       event(EventKind::kAdded, 1, 1.0, 0.0), event(EventKind::kUpdated, 1, 1.0, 0.0),
       event(EventKind::kRemoved, 2, 5.1, 0.0), moved(3, 7.0, 8.0)};
   ExpectedChanges expected;
-  expected.changes = {expect(ExpectedKind::kRemoved, 5.0), expect(ExpectedKind::kMoved, 8.2, 7.2),
-                      expect(ExpectedKind::kAdded, 1.2)};
+  expected.changes = {expect(EventKind::kRemoved, 5.0), expect(EventKind::kMoved, 8.2, 7.2),
+                      expect(EventKind::kAdded, 1.2)};
   expected.others = OtherReports::kNone;
   EXPECT_TRUE(disappointments(expected, events).empty());
-  expected.changes.push_back(expect(ExpectedKind::kRemoved, 5.0));
+  expected.changes.push_back(expect(EventKind::kRemoved, 5.0));
   EXPECT_EQ(disappointments(expected, events).size(), 1u) << "one event is not two";
 }
 
@@ -45,13 +45,13 @@ TEST(ExpectedChanges, PlaceKindAndClassHaveToFit) {
   const std::vector<ReportedEvent> events{moved(3, 7.0, 8.0)};
   ExpectedChanges expected;
   expected.others = OtherReports::kAny;
-  expected.changes = {expect(ExpectedKind::kMoved, 8.0, 5.0)};
+  expected.changes = {expect(EventKind::kMoved, 8.0, 5.0)};
   EXPECT_EQ(disappointments(expected, events).size(), 1u) << "from elsewhere";
-  expected.changes = {expect(ExpectedKind::kMoved, 9.0, 7.0)};
+  expected.changes = {expect(EventKind::kMoved, 9.0, 7.0)};
   EXPECT_EQ(disappointments(expected, events).size(), 1u) << "to elsewhere";
-  expected.changes = {expect(ExpectedKind::kAdded, 8.0)};
+  expected.changes = {expect(EventKind::kAdded, 8.0)};
   EXPECT_EQ(disappointments(expected, events).size(), 1u);
-  expected.changes = {expect(ExpectedKind::kMoved, 8.0, 7.0)};
+  expected.changes = {expect(EventKind::kMoved, 8.0, 7.0)};
   expected.changes[0].class_name = "fence";
   EXPECT_EQ(
       disappointments(expected, events),
@@ -77,7 +77,7 @@ TEST(ExpectedChanges, WhatAMoveTakesBackIsNotReported) {
                                           moved(3, 7.0, 8.0)};
   ExpectedChanges expected;
   expected.others = OtherReports::kNone;
-  expected.changes = {expect(ExpectedKind::kMoved, 8.0, 7.0)};
+  expected.changes = {expect(EventKind::kMoved, 8.0, 7.0)};
   EXPECT_TRUE(disappointments(expected, events).empty());
 }
 

@@ -30,8 +30,8 @@ struct GridExtentConfig {
 
 /// Form of the messages whose types differ between releases of ROS 2.
 enum class RosRelease {
-  kHumble,  ///< humble
-  kIron,    ///< iron and all later ones
+  kHumble,
+  kIron,  ///< and all later ones
 };
 inline EnumWords<RosRelease> words_of(RosRelease) {
   return {{RosRelease::kHumble, "humble"}, {RosRelease::kIron, "iron"}};

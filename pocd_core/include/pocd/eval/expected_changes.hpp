@@ -9,11 +9,10 @@
 
 namespace pocd {
 
-enum class ExpectedKind { kAdded, kMoved, kRemoved };
-inline EnumWords<ExpectedKind> words_of(ExpectedKind) {
-  return {{ExpectedKind::kAdded, "ADDED"},
-          {ExpectedKind::kMoved, "MOVED"},
-          {ExpectedKind::kRemoved, "REMOVED"}};
+/// Those that can be expected.
+inline EnumWords<EventKind> words_of(EventKind) {
+  return {
+      {EventKind::kAdded, "ADDED"}, {EventKind::kMoved, "MOVED"}, {EventKind::kRemoved, "REMOVED"}};
 }
 
 /// What may be reported beside what is expected.
@@ -29,7 +28,7 @@ inline EnumWords<OtherReports> words_of(OtherReports) {
 
 /// One report that has to come. Places are of the box, on the ground, map frame.
 struct ExpectedChange {
-  ExpectedKind kind = ExpectedKind::kAdded;
+  EventKind kind = EventKind::kAdded;
   std::string class_name;
   double x_m = 0.0, y_m = 0.0;
   double from_x_m = 0.0, from_y_m = 0.0;  ///< MOVED only
