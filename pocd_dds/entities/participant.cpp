@@ -138,12 +138,17 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
     throw InputError("domain " + std::to_string(options.domain) + " is not in [0, 232]");
   }
   DomainParticipantQos qos = participant_qos(options);
-  const std::string unwatched = watch_transports(qos, impl_->discovery.calls());
+  const bool secured = !options.security_folder.empty();
+  const std::string unwatched = watch_transports(
+      qos, {impl_->discovery.calls(), secured ? std::make_shared<std::mutex>() : nullptr});
   if (!unwatched.empty()) {
     log_warning(
         "{}: the profile of the participant uses {}: when Fast DDS's discovery hangs (Fast-DDS "
-        "#6502), it is not noticed by what comes that way (docs/operating.md)",
-        options.name, unwatched);
+        "#6502), it is not noticed by what comes that way (docs/operating.md){}",
+        options.name, unwatched,
+        secured ? ", and a participant that is discovered by it at the same time as another one "
+                  "may stay unheard (docs/security.md)"
+                : "");
   }
   auto flow = std::make_shared<rtps::FlowControllerDescriptor>();
   flow->name = kBackground;
@@ -155,10 +160,9 @@ Participant::Participant(const BusOptions& options) : impl_(std::make_unique<Imp
   if (impl_->participant == nullptr) {
     throw InputError("cannot join domain " + std::to_string(options.domain) +
                      ": Fast DDS made no participant (see its messages; is a network up?" +
-                     (options.security_folder.empty()
-                          ? ")"
-                          : " Are the files in " + options.security_folder +
-                                " of one authority and not expired?)"));
+                     (secured ? " Are the files in " + options.security_folder +
+                                    " of one authority and not expired?)"
+                              : ")"));
   }
   impl_->publisher = impl_->participant->create_publisher(PUBLISHER_QOS_DEFAULT);
   impl_->subscriber = impl_->participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);

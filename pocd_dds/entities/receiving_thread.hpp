@@ -2,12 +2,12 @@
 #pragma once
 
 #include <fastdds/rtps/transport/TransportReceiverInterface.h>
-#include <pthread.h>
 
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <ctime>
+
+#include "pocd_dds/entities/started_thread.hpp"
 
 namespace pocd::dds {
 
@@ -15,9 +15,10 @@ namespace pocd::dds {
 /// needs a new one. turns() may be called beside OnDataReceived.
 ///
 /// A message in a port only names the segment of its sender. Fast DDS 2.9.1 gives up the segments
-/// of a process that was killed after some seconds. Who was held up meanwhile finds a message of
-/// that process, cannot open its segment, and asks for the same message again, without an end: the
-/// thread uses a processor and receives nothing more (ros2cli #582, Fast-DDS #2398).
+/// of a process that ends, and some seconds later those of one that was killed. Who was held up
+/// meanwhile, or has just started, finds a message of that process, cannot open its segment, and
+/// asks for the same message again, without an end: the thread uses a processor and receives
+/// nothing more (ros2cli #582, Fast-DDS #2398).
 class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverInterface {
  public:
   using Octet = eprosima::fastrtps::rtps::octet;
@@ -25,11 +26,13 @@ class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverI
 
   explicit ReceivingThread(TransportReceiverInterface* next) : next_(next) {}
 
+  /// The thread that calls OnDataReceived, if it ever does, by its kernel id (started_thread.hpp). To
+  /// be told once, before the first call of turns(): a thread that turns from its start on never
+  /// shows itself.
+  void is(int thread) { thread_ = thread; }
+
   void OnDataReceived(const Octet* data, const std::uint32_t size, const Locator& local,
                       const Locator& remote) override {
-    if (!known_) {
-      known_ = pthread_getcpuclockid(pthread_self(), &clock_) == 0;
-    }
     within_ = true;
     next_->OnDataReceived(data, size, local, remote);
     ++received_;
@@ -40,7 +43,7 @@ class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverI
   /// finds that it has worked since the call before and received nothing.
   bool turns() {
     const std::uint64_t received = received_;
-    const std::chrono::nanoseconds worked = processor_time();
+    const std::chrono::nanoseconds worked = processor_time(thread_);
     const bool idle = within_ || received != last_received_ || worked - last_worked_ < kWork;
     last_received_ = received;
     last_worked_ = worked;
@@ -53,15 +56,9 @@ class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverI
   static constexpr std::chrono::milliseconds kWork{50};
   static constexpr int kLooks = 3;
 
-  std::chrono::nanoseconds processor_time() const {
-    std::timespec time{};
-    if (!known_ || clock_gettime(clock_, &time) != 0) return {};
-    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
-  }
-
   TransportReceiverInterface* const next_;
-  clockid_t clock_{};  // of the thread; written before it is known
-  std::atomic<bool> known_{false}, within_{false};
+  int thread_ = 0;
+  std::atomic<bool> within_{false};
   std::atomic<std::uint64_t> received_{0};
   // Of who asks.
   std::uint64_t last_received_ = 0;

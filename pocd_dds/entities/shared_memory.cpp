@@ -17,6 +17,7 @@
 #include "pocd_dds/entities/one_at_a_time.hpp"
 #include "pocd_dds/entities/port_files.hpp"
 #include "pocd_dds/entities/receiving_thread.hpp"
+#include "pocd_dds/entities/started_thread.hpp"
 
 namespace pocd::dds {
 namespace {
@@ -293,7 +294,10 @@ class LastingTransport final : public rtps::TransportInterface {
   }
   bool open_input(Input& input) {
     auto thread = std::make_unique<ReceivingThread>(input.receiver);
-    if (!receiving_->OpenInputChannel(input.locator, thread.get(), input.size)) return false;
+    bool opened = false;
+    thread->is(started_by(
+        [&] { opened = receiving_->OpenInputChannel(input.locator, thread.get(), input.size); }));
+    if (!opened) return false;
     input.thread = std::move(thread);
     input.port = {port_file_id(input.locator.port), {}, false};
     return true;
@@ -307,7 +311,7 @@ class LastingTransport final : public rtps::TransportInterface {
           port, true, [port](std::uint64_t id) { return id != 0 && has_port_file(port, id); });
       if (!turns && !replaced) continue;
       log_warning("shared memory: {} {}; opens it anew to receive",
-                  turns ? "what a killed process has said last holds up port"
+                  turns ? "what a process has said before its end holds up port"
                         : "another process has made anew port",
                   port);
       receiving_->CloseInputChannel(input.locator);

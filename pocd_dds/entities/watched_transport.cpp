@@ -27,8 +27,8 @@ struct Below final : rtps::ChainingTransportDescriptor {
 class WatchedTransport final : public rtps::ChainingTransport {
  public:
   WatchedTransport(const std::shared_ptr<rtps::TransportDescriptorInterface>& below,
-                   std::shared_ptr<OpenCalls> calls)
-      : ChainingTransport(Below(below)), calls_(std::move(calls)) {}
+                   Reception reception)
+      : ChainingTransport(Below(below)), reception_(std::move(reception)) {}
 
   bool OpenOutputChannel(rtps::SendResourceList& senders,
                          const fastrtps::Locator_t& locator) override {
@@ -47,42 +47,44 @@ class WatchedTransport final : public rtps::ChainingTransport {
   void receive(rtps::TransportReceiverInterface* next, const fastrtps::octet* data,
                std::uint32_t size, const fastrtps::Locator_t& local,
                const fastrtps::Locator_t& remote) override {
-    const OpenCalls::Call call(*calls_);
+    const OpenCalls::Call call(*reception_.calls);
+    std::unique_lock<std::mutex> turn;
+    if (reception_.turn) turn = std::unique_lock<std::mutex>(*reception_.turn);
     next->OnDataReceived(data, size, local, remote);
   }
 
  private:
-  const std::shared_ptr<OpenCalls> calls_;
+  const Reception reception_;
 };
 
 /// Stays a descriptor of its kind, as Fast DDS asks for that.
 template <class Descriptor>
 class Watched final : public Descriptor {
  public:
-  Watched(const Descriptor& settings, std::shared_ptr<OpenCalls> calls)
-      : Descriptor(settings), calls_(std::move(calls)) {}
+  Watched(const Descriptor& settings, Reception reception)
+      : Descriptor(settings), reception_(std::move(reception)) {}
   rtps::TransportInterface* create_transport() const override {
     return new WatchedTransport(std::make_shared<Descriptor>(static_cast<const Descriptor&>(*this)),
-                                calls_);
+                                reception_);
   }
 
  private:
-  std::shared_ptr<OpenCalls> calls_;
+  Reception reception_;
 };
 
 template <class Descriptor>
 bool watch(std::shared_ptr<rtps::TransportDescriptorInterface>& transport,
-           const std::shared_ptr<OpenCalls>& calls) {
+           const Reception& reception) {
   const auto* found = dynamic_cast<const Descriptor*>(transport.get());
   if (found == nullptr) return false;
-  transport = std::make_shared<Watched<Descriptor>>(*found, calls);
+  transport = std::make_shared<Watched<Descriptor>>(*found, reception);
   return true;
 }
 
 }  // namespace
 
 std::string watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
-                             const std::shared_ptr<OpenCalls>& calls) {
+                             const Reception& reception) {
   std::string unwatched;
   const auto add = [&](const char* name) {
     if (unwatched.find(name) == std::string::npos) {
@@ -90,9 +92,9 @@ std::string watch_transports(eprosima::fastdds::dds::DomainParticipantQos& qos,
     }
   };
   for (auto& transport : qos.transport().user_transports) {
-    if (watch<LastingSharedMemory>(transport, calls) ||
-        watch<rtps::UDPv4TransportDescriptor>(transport, calls) ||
-        watch<rtps::UDPv6TransportDescriptor>(transport, calls)) {
+    if (watch<LastingSharedMemory>(transport, reception) ||
+        watch<rtps::UDPv4TransportDescriptor>(transport, reception) ||
+        watch<rtps::UDPv6TransportDescriptor>(transport, reception)) {
       continue;
     }
     const bool tcp = dynamic_cast<const rtps::TCPTransportDescriptor*>(transport.get()) != nullptr;

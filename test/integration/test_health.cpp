@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "full_writers.hpp"
-#include "hung_discovery.hpp"
+#include "preloaded.hpp"
 #include "robot_sender.hpp"
 
 namespace pocd {
@@ -226,7 +226,8 @@ TEST(Health, DiscoveryThatHangsIsSaidAndWhatIsSaidRecovers) {
   const TemporaryFolder folder;
   const auto hang = folder.path() / "hang", socket = folder.path() / "health";
   HealthWatch health(test_participant(domain));
-  Process node(with_hung_discovery(hang, quick_command(domain, {"--health-socket", socket})));
+  Process node(with_hung_discovery(POCD_HUNG_DISCOVERY, hang,
+                                   quick_command(domain, {"--health-socket", socket})));
   const auto ask = [&] {
     return run_command({bin("pocd_health"), "--ready", "--timeout", "1", "--socket", socket,
                         "--domain", domain.text()});
@@ -268,7 +269,8 @@ TEST(Health, ACopyInWhichDiscoveryHangsIsNotInStep) {
   const TemporaryFolder folder;
   const auto hang = folder.path() / "hang";
   Process node(quick_command(domain));
-  Process mirror(with_hung_discovery(hang, {bin("pocd_mirror"), "--domain", domain.text()}));
+  Process mirror(with_hung_discovery(POCD_HUNG_DISCOVERY, hang,
+                                     {bin("pocd_mirror"), "--domain", domain.text()}));
   const auto says = [&](const std::string& text) {
     return eventually([&] { return mirror.err().find(text) != std::string::npos; });
   };

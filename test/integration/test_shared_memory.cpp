@@ -5,18 +5,22 @@
 #include <sys/mount.h>
 #include <unistd.h>
 
+#include <fastdds/rtps/transport/TransportInterface.h>
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/rtps/common/LocatorList.hpp>
 #include <iostream>
 #include <set>
 #include <thread>
 
 #include "bus_harness.hpp"
 #include "pocd_dds/entities/port_files.hpp"
+#include "pocd_dds/entities/shared_memory.hpp"
 #include "pocd_dds/entities/writer.hpp"
 #include "pocd_dds/object_watch.hpp"
 
@@ -186,6 +190,64 @@ TEST(SharedMemory, AReceiverThatWasHeldUpWhenASenderWasKilledHearsOthers) {
   Process next(part("WritesManifests"));
   EXPECT_TRUE(eventually([&] { return held_up.heard > 50; })) << next.err();
   receiver->subscriber()->delete_datareader(reader);
+}
+
+namespace rtps = eprosima::fastdds::rtps;
+
+/// Sends to a port of this host from a segment of its own.
+class PortSender {
+ public:
+  explicit PortSender(std::uint32_t port) {
+    rtps::Locator locator(LOCATOR_KIND_SHM, port);
+    to_.push_back(locator);
+    EXPECT_TRUE(transport_->init() && transport_->OpenOutputChannel(way_, locator));
+  }
+  bool send() {
+    rtps::Locators begin(to_.begin()), end(to_.end());
+    const std::array<eprosima::fastrtps::rtps::octet, 16> data{};
+    return way_.front()->send(data.data(), data.size(), &begin, &end,
+                              std::chrono::steady_clock::now() + std::chrono::seconds(1));
+  }
+
+ private:
+  std::unique_ptr<rtps::TransportInterface> transport_{
+      rtps::SharedMemTransportDescriptor().create_transport()};
+  rtps::SendResourceList way_;
+  rtps::LocatorList to_;
+};
+
+class Counts : public rtps::TransportReceiverInterface {
+ public:
+  std::atomic<int> heard{0};
+
+ private:
+  void OnDataReceived(const eprosima::fastrtps::rtps::octet*, std::uint32_t, const rtps::Locator&,
+                      const rtps::Locator&) override {
+    ++heard;
+  }
+};
+
+// A process that starts while another one ends: nothing was ever received before.
+TEST(SharedMemory, AReceiverWhoseFirstMessageIsOfOneThatHasGoneHearsOthers) {
+  if (!own_shared_memory().empty()) GTEST_SKIP() << own_shared_memory();
+  constexpr std::uint32_t kPort = 7421;
+  Counts received;
+  const std::unique_ptr<rtps::TransportInterface> receiver(
+      dds::LastingSharedMemory(rtps::SharedMemTransportDescriptor()).create_transport());
+  ASSERT_TRUE(receiver->init());
+  const rtps::Locator port(LOCATOR_KIND_SHM, kPort);
+  ASSERT_TRUE(receiver->OpenInputChannel(port, &received, 65500));
+  const std::set<std::string> before = segments();
+  PortSender gone(kPort);
+  for (const std::string& name : segments()) {
+    if (before.count(name) == 0) std::filesystem::remove("/dev/shm/" + name);
+  }
+  ASSERT_EQ(segments(), before);
+  ASSERT_TRUE(gone.send());
+  PortSender next(kPort);
+  EXPECT_TRUE(eventually([&] { return next.send() && received.heard > 0; }));
+  receiver->CloseInputChannel(port);
+  receiver->shutdown();
 }
 
 TEST(SharedMemory, AReceiverWhosePortWasMadeAnewByOthersListensThere) {

@@ -34,9 +34,12 @@ inline RunSummary offline_run(const std::string& input, const std::filesystem::p
 }
 
 /// Plays to the end, then ends the component in order; both have to succeed. What it said.
-inline std::string play_and_end(Process& node, const std::vector<std::string>& play) {
+/// `before_end`: while the component is still there, which is soon gone after a run this short.
+inline std::string play_and_end(Process& node, const std::vector<std::string>& play,
+                                const std::function<void()>& before_end = {}) {
   const CommandResult played = run_command(play);
   EXPECT_EQ(played.exit_code, 0) << played.err;
+  if (before_end) before_end();
   node.signal(SIGINT);
   const CommandResult ended = node.wait();
   EXPECT_EQ(ended.exit_code, 0) << ended.err;
@@ -46,7 +49,8 @@ inline std::string play_and_end(Process& node, const std::vector<std::string>& p
 /// The same, with a mirror beside it that has to end with the map of the offline run.
 inline std::string play_and_compare(const TestDomain& domain, Process& node,
                                     const std::vector<std::string>& play, const RunSummary& offline,
-                                    const std::vector<std::string>& mirror_more = {}) {
+                                    const std::vector<std::string>& mirror_more = {},
+                                    const std::function<void()>& before_end = {}) {
   std::vector<std::string> follow{bin("pocd_mirror"), "--until-end", "--timeout", "300",
                                   "--domain",         domain.text()};
   follow.insert(follow.end(), mirror_more.begin(), mirror_more.end());
@@ -55,7 +59,7 @@ inline std::string play_and_compare(const TestDomain& domain, Process& node,
   EXPECT_TRUE(eventually([&] {
     return mirror.err().find("in step with publisher") != std::string::npos;
   })) << mirror.err();
-  const std::string said = play_and_end(node, play);
+  const std::string said = play_and_end(node, play, before_end);
   const CommandResult mirrored = mirror.wait();
   EXPECT_EQ(mirrored.exit_code, 0) << mirrored.err;
   EXPECT_NE(mirrored.out.find("digest " + offline.map_digest), std::string::npos)
