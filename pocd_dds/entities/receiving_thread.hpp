@@ -26,10 +26,10 @@ class ReceivingThread final : public eprosima::fastdds::rtps::TransportReceiverI
 
   explicit ReceivingThread(TransportReceiverInterface* next) : next_(next) {}
 
-  /// The thread that calls OnDataReceived, if it ever does, by its kernel id (started_thread.hpp). To
-  /// be told once, before the first call of turns(): a thread that turns from its start on never
+  /// `thread` is the one that calls OnDataReceived, by its kernel id (started_thread.hpp). To be
+  /// called once, before the first call of turns(): a thread that turns from its start on never
   /// shows itself.
-  void is(int thread) { thread_ = thread; }
+  void set_thread(int thread) { thread_ = thread; }
 
   void OnDataReceived(const Octet* data, const std::uint32_t size, const Locator& local,
                       const Locator& remote) override {

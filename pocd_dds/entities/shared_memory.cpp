@@ -295,7 +295,7 @@ class LastingTransport final : public rtps::TransportInterface {
   bool open_input(Input& input) {
     auto thread = std::make_unique<ReceivingThread>(input.receiver);
     bool opened = false;
-    thread->is(started_by(
+    thread->set_thread(started_by(
         [&] { opened = receiving_->OpenInputChannel(input.locator, thread.get(), input.size); }));
     if (!opened) return false;
     input.thread = std::move(thread);
