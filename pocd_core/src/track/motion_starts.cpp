@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pocd/observe/look.hpp"
+
 namespace pocd {
 namespace {
 
@@ -11,12 +13,28 @@ namespace {
 constexpr std::size_t kStarts = 16;
 constexpr std::size_t kStartPoints = 60;
 
+/// So long at most is a thing taken for the one in whose place it stands [s].
+constexpr double kMistakenS = 1.0;
+
 /// A length of a thing of which only a part may be known.
 double with_room(double length_m, double slack_m) {
   return length_m + std::max(slack_m, 0.25 * length_m);
 }
 
 }  // namespace
+
+bool were_both_there(const Departure& departure, const LibraryObject& found, double visit_gap_s,
+                     double slack_m) {
+  const double together_s = 1e-9 * static_cast<double>(departure.in_place_ns - found.first_seen_ns);
+  if (together_s <= 0.0) return false;
+  const double until_gone_s =
+      1e-9 * static_cast<double>(departure.departed_ns - departure.in_place_ns);
+  if (together_s > kMistakenS || until_gone_s > visit_gap_s) return true;
+  const auto& surfels = found.model.surfels();
+  return std::none_of(surfels.begin(), surfels.end(), [&](const Surfel& s) {
+    return is_inside(departure.box, slack_m, s.point_W);
+  });
+}
 
 bool stands_as_high(const OrientedBox& found, const OrientedBox& known, double slack_m) {
   return known.size_m.z() <= with_room(found.size_m.z(), slack_m);

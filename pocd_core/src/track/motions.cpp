@@ -103,8 +103,8 @@ std::vector<Motion> ObjectTracker::motions_of(const Step& step, const Departure&
                                               const LibraryObject& found, Asked asked) const {
   if (departure.class_id != found.class_id || departure.id == found.id) return {};
   if (found.id != ObjectId::kNone && departure.is_not == found.id) return {};
-  // What was seen in its place when the new one was there, too, is another thing.
-  if (departure.in_place_ns > found.first_seen_ns) return {};
+  if (were_both_there(departure, found, config_.state.visit_gap_s, config_.map.voxel_size_m))
+    return {};
   const double slack_m = 3.0 * config_.map.voxel_size_m;
   const double distance_m =
       (departure.box.pose.position_W - found.box.pose.position_W).head<2>().norm();

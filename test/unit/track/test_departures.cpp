@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "../../../pocd_core/src/track/motion_starts.hpp"
+
 namespace pocd {
 namespace {
 
@@ -152,6 +154,28 @@ TEST(Departures, MoreThanTheMostAreNotKeptWhateverTheStamps) {
   const auto& moves = departures.recent_moves(5 * kSecond, 60.0);
   EXPECT_EQ(moves.size(), Departures::kMost);
   EXPECT_EQ(moves.front().id, ObjectId{2});
+}
+
+// Of what was last in place at 99 s and found gone at 100 s, whether something first seen at this
+// time, so far from its middle, is another thing.
+bool is_another(double first_seen_s, float at_m, double visit_gap_s = 5.0) {
+  Departure d = departed(1, 100 * kSecond);
+  d.box.size_m = {1.0, 1.0, 1.0};
+  LibraryObject found(ObjectId{2}, 0.05);
+  found.first_seen_ns = static_cast<StampNs>(first_seen_s * 1e9);
+  Surfel surfel;
+  surfel.point_W = {at_m, 0.0f, 0.0f};
+  surfel.normal_W = {0.0f, 0.0f, 1.0f};
+  found.model.add({surfel});
+  return were_both_there(d, found, visit_gap_s, 0.05);
+}
+
+TEST(Departures, WhatStandsInItsPlaceIsTakenForItForAMomentAndNoLonger) {
+  EXPECT_FALSE(is_another(99.5, 2.0f)) << "it came later";
+  EXPECT_FALSE(is_another(98.5, 0.4f)) << "it stands partly where the other one was";
+  EXPECT_TRUE(is_another(98.5, 0.7f)) << "it stands beside it";
+  EXPECT_TRUE(is_another(97.5, 0.4f)) << "both were there for longer than a moment";
+  EXPECT_TRUE(is_another(98.5, 0.4f, 0.5)) << "in place on a visit before";
 }
 
 }  // namespace
