@@ -295,9 +295,15 @@ class LastingTransport final : public rtps::TransportInterface {
   bool open_input(Input& input) {
     auto thread = std::make_unique<ReceivingThread>(input.receiver);
     bool opened = false;
-    thread->set_thread(started_by(
-        [&] { opened = receiving_->OpenInputChannel(input.locator, thread.get(), input.size); }));
+    const int started = started_by(
+        [&] { opened = receiving_->OpenInputChannel(input.locator, thread.get(), input.size); });
     if (!opened) return false;
+    if (started == 0) {
+      log_warning(
+          "shared memory: no thread found that receives on port {}: not noticed if it hangs",
+          input.locator.port);
+    }
+    thread->set_thread(started);
     input.thread = std::move(thread);
     input.port = {port_file_id(input.locator.port), {}, false};
     return true;

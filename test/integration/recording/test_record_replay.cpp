@@ -119,11 +119,8 @@ TEST(RecordReplay, KeepsEveryPayloadOfAReplay) {
   EXPECT_EQ(first.count("/robot1/depth/image_raw"), 1u);
   EXPECT_EQ(first.count("/tf_static"), 1u);
   ByTopic second = payloads(folder / "second.mcap");
+  for (const auto& [topic, all] : first) EXPECT_TRUE(second[topic] == all) << topic;
   EXPECT_EQ(second.size(), first.size());
-  for (const auto& [topic, all] : first) {
-    EXPECT_EQ(second[topic].size(), all.size()) << topic;
-    EXPECT_TRUE(second[topic] == all) << topic;
-  }
 }
 
 TEST(RecordReplay, EveryFileOfASplitHasTheLatchedSamples) {
